@@ -1,0 +1,11 @@
+"""Policy gradients on bounded action spaces.
+
+Five rooms, in the order in which an action lives: it is drawn (:mod:`inbounds.distributions`), executed
+(:mod:`inbounds.robots`), learned from (:mod:`inbounds.learning`), studied (:mod:`inbounds.study`) and shown
+(:mod:`inbounds.book`).
+
+Importing the package is light: no Jupyter, Bokeh or mediapy. On Linux without a display it also chooses
+MuJoCo's off-screen backend, which has to happen before ``mujoco`` is imported for the first time.
+"""
+
+__version__ = "0.1.0"
