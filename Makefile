@@ -1,0 +1,55 @@
+# In Bounds. `make help` lists what there is; every target sets up what it needs and may be run again at any time.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.ONESHELL:
+
+PY := .venv/bin/python
+# Seeds in lockstep are one program on one core: more threads only make it slower (CONTRIBUTING.md, "Speed").
+export OMP_NUM_THREADS ?= 1
+NB ?= $(wildcard notebooks/[0-9]*.ipynb)
+PORT ?= 8000
+
+.PHONY: help setup book test check format notebooks pages serve lab dist bench study clean distclean
+
+help:  ## list these targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+setup:  ## create .venv and install the pinned packages (the other targets do this themselves)
+	@tools/setup.sh
+
+book: setup  ## execute the notebooks, build the HTML book, print its path  (FORCE=1: from nothing)
+	@$(PY) tools/build_book.py $(if $(FORCE),--force)
+
+test: setup  ## pytest on the package and the book, then nbval on the notebooks
+	@$(PY) tools/run_tests.py
+
+check: setup  ## format, lint, types, doctests, stored notebooks
+	@$(PY) tools/run_checks.py
+
+format: setup  ## let ruff format the code, and strip pictures from the stored notebooks
+	@$(PY) -m ruff format . && $(PY) -m ruff check --fix . && $(PY) tools/notebook_hook.py --write
+
+notebooks: setup  ## execute notebooks and store their text outputs  (NB=notebooks/01_….ipynb for some)
+	@$(PY) tools/execute_notebooks.py $(NB)
+
+pages: book  ## open every built page in headless Chromium and check it
+	@tools/setup.sh --with-browser
+	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
+
+serve: book  ## preview the built book on this machine  (PORT=8000)
+	@echo "Serving on http://127.0.0.1:$(PORT)/ (Ctrl-C ends it)"
+	$(PY) -m http.server --bind 127.0.0.1 --directory _build/html $(PORT)
+
+lab: setup  ## open JupyterLab on the notebooks
+	@$(PY) -m jupyterlab --notebook-dir=notebooks
+
+dist: book  ## zip the built book for reading offline
+	@$(PY) tools/build_book.py --zip
+
+clean:  ## remove everything built (keeps .venv)
+	@rm -rf _build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .cache
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+distclean: clean  ## also remove .venv
+	@rm -rf .venv

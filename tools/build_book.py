@@ -1,0 +1,94 @@
+"""Build the HTML book: execute the notebooks, run Jupyter Book strictly, print the path of the first page.
+
+    python tools/build_book.py            only what changed (seconds when nothing did)
+    python tools/build_book.py --force    from nothing
+    python tools/build_book.py --zip      put the built book into dist/in-bounds-VERSION.zip
+
+Jupyter Book caches executed notebooks by their cells alone. A chapter also depends on the package, the data and the
+pinned versions, so the cache lives in a folder named by a digest of those: change one and every notebook runs again.
+"""
+
+import argparse
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "_build"
+INDEX = BUILD / "html" / "index.html"
+STAMP = BUILD / "built-from"
+CODE = ("src", "results", "constraints.txt", "pyproject.toml")
+PAGES = ("book", "notebooks", "tools/build_book.py", "_config.yml", "_toc.yml")
+
+
+def digest(*names: str) -> str:
+    """A digest of the contents of files and folders (below ROOT), ignoring what Python and Jupyter leave behind."""
+    total = hashlib.sha256(sys.version.encode())
+    for name in names:
+        base = ROOT / name
+        for path in sorted(base.rglob("*")) if base.is_dir() else [base]:
+            if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts):
+                total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def build(code: str) -> int:
+    """Run Jupyter Book. The environment variable tells the chapters' helpers that the output is a static page."""
+    cache = BUILD / ".jupyter_cache" / code
+    for stale in cache.parent.glob("*"):
+        if stale != cache:
+            # Pages keep their outputs in pickled doctrees, which know nothing of the package either.
+            shutil.rmtree(stale)
+            shutil.rmtree(BUILD / ".doctrees", ignore_errors=True)
+    cache.mkdir(parents=True, exist_ok=True)
+    STAMP.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "jupyter_book", "build", str(ROOT), "--path-output", str(ROOT)]
+    return subprocess.run(
+        [*command, "--warningiserror", "--nitpick", "--keep-going", "-q"],
+        cwd=ROOT,
+        env={**os.environ, "INBOUNDS_BOOK_BUILD": "1", "INBOUNDS_NB_CACHE": str(cache)},
+        check=False,
+    ).returncode
+
+
+def zip_book() -> Path:
+    """One file to read offline: unpack it anywhere and open index.html."""
+    sys.path.insert(0, str(ROOT / "src"))
+    from inbounds import __version__
+
+    target = ROOT / "dist" / f"in-bounds-{__version__}"
+    target.parent.mkdir(exist_ok=True)
+    return Path(shutil.make_archive(str(target), "zip", INDEX.parent))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--force", action="store_true", help="build from nothing")
+    parser.add_argument("--zip", action="store_true", help="zip the built book into dist/")
+    args = parser.parse_args()
+
+    if args.force:
+        shutil.rmtree(BUILD, ignore_errors=True)
+    start, code = time.perf_counter(), digest(*CODE)
+    everything = f"{code} {digest(*PAGES)}"
+    if INDEX.exists() and STAMP.exists() and STAMP.read_text() == everything:
+        print("The book is up to date.")
+    else:
+        print("Executing the notebooks and building the pages ...", flush=True)
+        if status := build(code):
+            print("\nThe book was NOT built: see the messages above (a warning counts as an error).", file=sys.stderr)
+            return status
+        STAMP.write_text(everything)
+        print(f"Built in {time.perf_counter() - start:.0f} s.")
+    if args.zip:
+        print(f"Zipped: {zip_book()}")
+    print(f"Open {INDEX}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""Keep stored notebooks small and honest: text outputs only, every code cell executed in order, no errors.
+
+    python tools/notebook_hook.py --write [NOTEBOOK ...]    strip pictures, HTML and videos, normalise the metadata
+    python tools/notebook_hook.py --check [NOTEBOOK ...]    fail if a stored notebook is not as --write leaves it
+
+Pictures and videos are made by the build. What stays is the text form of each output, which nbval compares.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import nbformat
+
+ROOT = Path(__file__).resolve().parents[1]
+LIGHT = ("text/plain", "application/papermill.record/text/plain")
+METADATA = {
+    "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
+    "language_info": {"name": "python"},
+}
+
+
+def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """Drop heavy MIME types and whatever changes from one execution to the next without meaning anything."""
+    notebook.metadata = nbformat.from_dict(METADATA)
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)
+        for output in cell.get("outputs", []):
+            if "data" in output:
+                output.data = {mime: text for mime, text in output.data.items() if mime in LIGHT}
+                output.metadata = {k: v for k, v in output.metadata.items() if k == "scrapbook"}
+    return notebook
+
+
+def complaints(notebook: nbformat.NotebookNode) -> list[str]:
+    """What keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
+    found, expected = [], 1
+    for number, cell in enumerate(notebook.cells):
+        if cell.cell_type != "code" or not cell.source.strip():
+            continue
+        if cell.execution_count != expected:
+            found.append(f"cell {number}: execution count {cell.execution_count}, expected {expected}")
+        expected += 1
+        if len(cell.source.splitlines()) > 25:
+            found.append(f"cell {number}: {len(cell.source.splitlines())} lines; one idea a cell, 25 lines at most")
+        for output in cell.outputs:
+            if output.output_type == "error":
+                found.append(f"cell {number}: stores an error ({output.ename})")
+            if output.get("name") == "stderr":
+                found.append(f"cell {number}: wrote to stderr: {output.text.strip()[:80]}")
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    mode = parser.add_mutually_exclusive_group(required=True)
+    mode.add_argument("--write", action="store_true")
+    mode.add_argument("--check", action="store_true")
+    parser.add_argument("notebooks", nargs="*", type=Path)
+    args = parser.parse_args()
+
+    failures = 0
+    for path in args.notebooks or sorted((ROOT / "notebooks").glob("*.ipynb")):
+        stored = path.read_text(encoding="utf8")
+        notebook = strip(nbformat.reads(stored, as_version=4))
+        nbformat.validate(notebook)
+        stripped = nbformat.writes(notebook) + "\n"
+        if args.write and stripped != stored:
+            path.write_text(stripped, encoding="utf8")
+        problems = complaints(notebook)
+        if args.check and stripped != stored:
+            problems.append("stores pictures, HTML or volatile metadata: run `make format`")
+        for problem in problems:
+            print(f"{path.name}: {problem} (execute it with `make notebooks NB=notebooks/{path.name}`)")
+        failures += len(problems)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
