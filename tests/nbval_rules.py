@@ -1,7 +1,8 @@
 """What nbval compares in a notebook: text, exactly; pictures, HTML and videos, not at all.
 
-Loaded with ``pytest -p tests.nbval_rules --nbval``. Stored notebooks carry text outputs only (tools/notebook_hook.py), so the
-other forms have nothing to be compared with. A cell whose text may vary carries the tag ``nbval-ignore-output``, and no claim.
+Loaded with ``pytest -p tests.nbval_rules --nbval``. Stored notebooks carry text outputs only (tools/notebook_hook.py),
+so the other forms have nothing to be compared with. A cell whose text may vary carries the tag
+``nbval-ignore-output``, and no claim.
 """
 
 from typing import Any

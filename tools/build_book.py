@@ -66,7 +66,9 @@ def zip_book() -> Path:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--force", action="store_true", help="build from nothing")
     parser.add_argument("--zip", action="store_true", help="zip the built book into dist/")
     args = parser.parse_args()
@@ -80,7 +82,10 @@ def main() -> int:
     else:
         print("Executing the notebooks and building the pages ...", flush=True)
         if status := build(code):
-            print("\nThe book was NOT built: see the messages above (a warning counts as an error).", file=sys.stderr)
+            print(
+                "\nThe book was NOT built: see the messages above (a warning counts as an error).",
+                file=sys.stderr,
+            )
             return status
         STAMP.write_text(everything)
         print(f"Built in {time.perf_counter() - start:.0f} s.")

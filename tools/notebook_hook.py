@@ -42,7 +42,9 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
             found.append(f"cell {number}: execution count {cell.execution_count}, expected {expected}")
         expected += 1
         if len(cell.source.splitlines()) > 25:
-            found.append(f"cell {number}: {len(cell.source.splitlines())} lines; one idea a cell, 25 lines at most")
+            found.append(
+                f"cell {number}: {len(cell.source.splitlines())} lines; one idea a cell, 25 lines at most"
+            )
         for output in cell.outputs:
             if output.output_type == "error":
                 found.append(f"cell {number}: stores an error ({output.ename})")
@@ -52,7 +54,9 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     mode = parser.add_mutually_exclusive_group(required=True)
     mode.add_argument("--write", action="store_true")
     mode.add_argument("--check", action="store_true")

@@ -30,7 +30,10 @@ def run(label: str, arguments: list[str]) -> tuple[str, int]:
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         status = subprocess.run([*command, *arguments], cwd=ROOT, env=environment, check=False).returncode
         suites = ElementTree.parse(record).getroot().iter("testsuite") if record.exists() else []
-        counts = [{key: int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped")} for suite in suites]
+        counts = [
+            {key: int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped")}
+            for suite in suites
+        ]
     total = {key: sum(count[key] for count in counts) for key in ("tests", "failures", "errors", "skipped")}
     bad = total["failures"] + total["errors"] + total["skipped"]
     if total["tests"] == 0 or (status and not bad):

@@ -1,0 +1,170 @@
+"""The stored notebooks are faithful records of a clean run, and the tools that say so cannot be fooled."""
+
+import copy
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+
+def code_cells(notebook: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def test_there_are_notebooks() -> None:
+    assert NOTEBOOKS
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_stored_notebook_is_clean(path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "tools/notebook_hook.py", "--check", path],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_ignored_outputs_carry_no_claim(path: Path) -> None:
+    """A cell that nbval does not compare may show, but neither assert nor grade."""
+    for cell in code_cells(nbformat.read(path, as_version=4)):
+        if "nbval-ignore-output" in cell.metadata.get("tags", []):
+            assert "assert" not in cell.source
+            assert "graders." not in cell.source
+        assert "NBVAL" not in cell.source  # tags, not comments, say what nbval compares
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_anatomy(path: Path) -> None:
+    """Every chapter has the parts that the preface promises."""
+    prose = "\n".join(
+        cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown"
+    )
+    for part in (
+        "## Objectives",
+        "{prf:",
+        "{exercise}",
+        "{solution",
+        "## Pitfalls",
+        "In class",
+        "## Summary",
+        "{cite}",
+    ):
+        assert part in prose, part
+
+
+def small_notebook(folder: Path) -> nbformat.NotebookNode:
+    """The first chapter cut down to cells that run in a second, with one that prints a number."""
+    notebook = copy.deepcopy(nbformat.read(NOTEBOOKS[0], as_version=4))
+    number = nbformat.v4.new_code_cell("print(round(2 ** 0.5, 4))", execution_count=1)
+    number.outputs = [nbformat.v4.new_output("stream", name="stdout", text="1.4142\n")]
+    notebook.cells = [notebook.cells[0], number]
+    nbformat.write(notebook, folder / "chapter.ipynb")
+    return notebook
+
+
+def nbval(folder: Path) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "tools/run_tests.py", str(folder / "chapter.ipynb")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_untouched_copy_passes(tmp_path: Path) -> None:
+    small_notebook(tmp_path)
+    done = nbval(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_nbval_sees_a_changed_number(tmp_path: Path) -> None:
+    notebook = small_notebook(tmp_path)
+    notebook.cells[1].outputs[0].text = "1.4143\n"
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    done = nbval(tmp_path)
+    assert done.returncode != 0
+    assert "1.4143" in done.stdout
+
+
+def test_nbval_sees_a_cell_that_raises(tmp_path: Path) -> None:
+    notebook = small_notebook(tmp_path)
+    notebook.cells.append(nbformat.v4.new_code_cell("raise ValueError('planted')", execution_count=2))
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    done = nbval(tmp_path)
+    assert done.returncode != 0
+    assert "planted" in done.stdout
+
+
+def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
+    """nbval marks what follows a dead kernel as expected failures: that must not count as passing."""
+    notebook = small_notebook(tmp_path)
+    notebook.cells.append(nbformat.v4.new_code_cell("import os; os._exit(1)", execution_count=2))
+    notebook.cells.append(nbformat.v4.new_code_cell("print('never')", execution_count=3))
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    assert nbval(tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize(
+    ("plant", "complaint"),
+    [
+        (lambda cell: cell.update(execution_count=None, outputs=[]), "execution count None"),
+        (lambda cell: cell.update(source="pass\n" * 26), "25 lines at most"),
+        (
+            lambda cell: cell.outputs.append(nbformat.v4.new_output("stream", name="stderr", text="w")),
+            "stderr",
+        ),
+        (
+            lambda cell: cell.outputs.append(
+                nbformat.v4.new_output("error", ename="E", evalue="", traceback=[])
+            ),
+            "stores an error",
+        ),
+        (
+            lambda cell: cell.outputs.append(
+                nbformat.v4.new_output("display_data", data={"image/png": "aGk="})
+            ),
+            "stores pictures",
+        ),
+    ],
+)
+def test_the_hook_sees(tmp_path: Path, plant, complaint: str) -> None:
+    notebook = small_notebook(tmp_path)
+    plant(notebook.cells[1])
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    done = subprocess.run(
+        [sys.executable, "tools/notebook_hook.py", "--check", str(tmp_path / "chapter.ipynb")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert complaint in done.stdout
+
+
+@pytest.mark.slow
+def test_a_broken_notebook_fails_the_build(tmp_path: Path) -> None:
+    """Jupyter Book exits 0 over a failing notebook unless told otherwise; our configuration tells it."""
+    notebook = small_notebook(tmp_path)
+    notebook.cells[0].source = "# A chapter"
+    notebook.cells[1].source = "raise ValueError('planted')"
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    (tmp_path / "_toc.yml").write_text("format: jb-book\nroot: chapter\n")
+    (tmp_path / "_config.yml").write_text(
+        (ROOT / "_config.yml").read_text().replace("book/", f"{ROOT}/book/")
+    )
+    command = [sys.executable, "-m", "jupyter_book", "build", str(tmp_path), "-q", "-W", "-n", "--keep-going"]
+    for _ in range(2):  # the second run, with everything cached, must fail as well
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode != 0
+        assert "planted" in done.stdout + done.stderr

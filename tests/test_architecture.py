@@ -1,0 +1,65 @@
+"""The rules of the house: imports go one way, the package is light, files stay readable."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "src" / "inbounds"
+MAY_IMPORT = {
+    "distributions": set(),
+    "robots": set(),
+    "learning": {"distributions", "robots"},
+    "study": {"distributions", "robots", "learning"},
+    "book": {"distributions", "robots", "learning", "study"},
+    "cli": {"distributions", "robots", "learning", "study", "book"},
+}
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def rooms_imported(path: Path) -> set[str]:
+    """Names of the rooms that a module imports, wherever in the file it does so."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            if node.level:  # relative: resolve against the module's own package
+                base = ["inbounds", *path.relative_to(PACKAGE).parent.parts]
+                stem = base[: len(base) - node.level + 1]
+                names = [".".join([*stem, *(node.module or alias.name for alias in node.names)])]
+            elif node.module == "inbounds":
+                names = [f"inbounds.{alias.name}" for alias in node.names]
+            else:
+                names = [node.module or ""]
+        found |= {name.split(".")[1] for name in names if name.startswith("inbounds.")}
+    return found & set(MAY_IMPORT)
+
+
+@pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in MAY_IMPORT], ids=str)
+def test_imports_go_one_way(path: Path) -> None:
+    room = room_of(path)
+    assert rooms_imported(path) <= MAY_IMPORT[room] | {room}
+
+
+@pytest.mark.parametrize(
+    "statement", ["import inbounds", "import inbounds.distributions", "import inbounds.robots"]
+)
+def test_importing_is_light(statement: str) -> None:
+    heavy = ["IPython", "jupyter_core", "ipykernel", "bokeh", "mediapy", "matplotlib"]
+    code = f"{statement}; import sys; print(*[m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("path", MODULES, ids=str)
+def test_a_file_can_be_read_in_one_sitting(path: Path) -> None:
+    assert len(path.read_text(encoding="utf8").splitlines()) <= 350
