@@ -8,4 +8,8 @@ Importing the package is light: no Jupyter, Bokeh or mediapy. On Linux without a
 MuJoCo's off-screen backend, which has to happen before ``mujoco`` is imported for the first time.
 """
 
+from inbounds.robots.headless import choose_backend
+
 __version__ = "0.1.0"
+
+choose_backend()

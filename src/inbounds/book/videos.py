@@ -1,0 +1,190 @@
+"""Short captioned videos, side by side, inside a page.
+
+A video is an MP4 (H.264, 4:2:0, the one format that every browser plays), carried in the page itself, so that the
+built book needs no other file. It starts when the reader asks, ends after at most five seconds and weighs at
+most 120 kB. The encoder is the ffmpeg that the package ``imageio-ffmpeg`` brings along.
+"""
+
+import base64
+import html
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inbounds.robots.rendering import Film
+
+MAX_SECONDS = 5.0
+MAX_BYTES = 120_000
+
+_PAGE_QUANTISERS = (30, 33, 36, 39, 42)  # the first that keeps a video small enough is taken
+_FILE_QUANTISER = 22  # for files, which are watched larger
+# No frame is predicted from a later one, so the stream opens with frame 0 and no player has to skip;
+# the index stands at the front, so that the duration is known before the video is played.
+_FFMPEG_ARGS = ("-bf", "0", "-movflags", "+faststart", "-map_metadata", "-1", "-fflags", "+bitexact")
+
+
+@dataclass(frozen=True)
+class Video:
+    """One encoded video.
+
+    Attributes:
+        title: the caption.
+        mp4: the file's bytes.
+        poster: JPEG of the first frame, shown until the video is played.
+        width: in pixels.
+        height: in pixels.
+        seconds: duration.
+    """
+
+    title: str
+    mp4: bytes
+    poster: bytes
+    width: int
+    height: int
+    seconds: float
+
+    def to_html(self) -> str:
+        """A figure with the video and its caption."""
+        title = html.escape(self.title, quote=True)
+        label = f"Video, {self.seconds:.1f} seconds: {title}"
+        return (
+            f'<figure style="margin:0;flex:1 1 14rem;min-width:0;max-width:{self.width}px">'
+            f'<video controls muted playsinline preload="metadata" aria-label="{label}" '
+            f'poster="data:image/jpeg;base64,{_base64(self.poster)}" '
+            f'style="display:block;width:100%;height:auto;aspect-ratio:{self.width}/{self.height}">'
+            f'<source type="video/mp4" src="data:video/mp4;base64,{_base64(self.mp4)}">'
+            f"{label} (this browser cannot play it)</video>"
+            f'<figcaption style="text-align:center;margin-top:0.25rem">{title}</figcaption></figure>'
+        )
+
+
+class VideoRow:
+    """Videos side by side; on a narrow screen, one below the other. A notebook shows the object itself.
+
+    Attributes:
+        videos: the encoded videos, in order.
+    """
+
+    def __init__(self, videos: list[Video]) -> None:
+        self.videos = videos
+
+    def __iter__(self) -> Iterator[Video]:
+        return iter(self.videos)
+
+    def __repr__(self) -> str:
+        count = f"{len(self.videos)} video{'s' if len(self.videos) != 1 else ''}"
+        return f"<{count}: {', '.join(repr(video.title) for video in self.videos)}>"
+
+    def _repr_html_(self) -> str:
+        figures = "".join(video.to_html() for video in self.videos)
+        return (
+            '<div class="inbounds-videos" style="display:flex;flex-wrap:wrap;gap:1rem;justify-content:center">'
+            f"{figures}</div>"
+        )
+
+
+def show_films(films: Mapping[str, Film]) -> VideoRow:
+    """Encode films for a page, side by side under their captions.
+
+    Args:
+        films: caption → film, each of at most five seconds and of even width and height.
+
+    Returns:
+        An object that a notebook shows as videos, and whose text form names them.
+
+    Raises:
+        ValueError: no film; a film too long, or too large even when coarsely encoded; odd size.
+        RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
+
+    Example:
+        >>> from inbounds.robots import Film
+        >>> frames = np.zeros((10, 32, 48, 3), np.uint8)
+        >>> show_films({"Gaussian": Film(frames, 25.0, 0.0), "Beta": Film(frames, 25.0, 0.0)})
+        <2 videos: 'Gaussian', 'Beta'>
+    """
+    if not films:
+        raise ValueError("There is no film to show: pass a mapping from captions to films.")
+    return VideoRow([_encode_for_page(title, film) for title, film in films.items()])
+
+
+def write_film(path: str | os.PathLike[str], film: Film) -> Path:
+    """Write a film to an MP4 file, of any length and in good quality.
+
+    Args:
+        path: of the file; its folder must exist.
+        film: the film, of even width and height.
+
+    Returns:
+        The path.
+
+    Raises:
+        ValueError: odd width or height.
+        RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
+    """
+    path = Path(path)
+    path.write_bytes(_encode(film, _FILE_QUANTISER))
+    return path
+
+
+def _encode_for_page(title: str, film: Film) -> Video:
+    num_frames, height, width = film.frames.shape[:3]
+    seconds = num_frames / film.fps
+    if seconds > MAX_SECONDS:
+        raise ValueError(
+            f"{title!r} lasts {seconds:.1f} s, a page allows {MAX_SECONDS:.0f} s: record fewer seconds."
+        )
+    for quantiser in _PAGE_QUANTISERS:
+        mp4 = _encode(film, quantiser)
+        if len(mp4) <= MAX_BYTES:
+            return Video(title, mp4, _poster(film.frames[0]), width, height, seconds)
+    raise ValueError(
+        f"{title!r} takes {len(mp4) / 1000:.0f} kB, a page allows {MAX_BYTES / 1000:.0f} kB: "
+        "record fewer seconds or smaller frames."
+    )
+
+
+def _encode(film: Film, quantiser: int) -> bytes:
+    """The film as the bytes of an MP4 file; a larger quantiser (0 to 51) makes it smaller and coarser."""
+    height, width = film.frames.shape[1:3]
+    if height % 2 or width % 2:
+        raise ValueError(f"Width and height must be even for 4:2:0 colour, got {width} × {height}.")
+    data: bytes = _mediapy().compress_video(
+        film.frames,
+        codec="h264",
+        fps=film.fps,
+        qp=quantiser,
+        encoded_format="yuv420p",
+        ffmpeg_args=_FFMPEG_ARGS,
+    )
+    return data
+
+
+def _poster(frame: NDArray[np.uint8]) -> bytes:
+    data: bytes = _mediapy().compress_image(frame, fmt="jpeg", quality=60)
+    return data
+
+
+def _mediapy() -> Any:
+    """The library mediapy, told to use the ffmpeg that imageio-ffmpeg brings."""
+    try:
+        import imageio_ffmpeg
+        import mediapy
+    except ImportError as error:
+        raise RuntimeError(f"Videos need {error.name}: pip install 'inbounds[book]'") from error
+    try:
+        mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError as error:
+        raise RuntimeError(
+            "No ffmpeg was found to encode videos: pip install --force-reinstall imageio-ffmpeg "
+            "(its wheel brings one), or set IMAGEIO_FFMPEG_EXE to the path of yours."
+        ) from error
+    return mediapy
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")

@@ -1,0 +1,32 @@
+"""Where actions are executed: MuJoCo's robots, stepped in one batch and drawn without a display.
+
+Names are imported on first use, because ``import inbounds`` passes through this package to choose the off-screen
+backend (:mod:`inbounds.robots.headless`), and that has to happen before ``mujoco`` is imported.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from inbounds.robots.rendering import Camera, Film, RobotRenderer, record
+
+_HOME = {
+    "Camera": "rendering",
+    "Film": "rendering",
+    "RobotRenderer": "rendering",
+    "record": "rendering",
+}
+
+__all__ = ["Camera", "Film", "RobotRenderer", "record"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value  # found directly from now on
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])
