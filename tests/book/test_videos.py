@@ -1,0 +1,178 @@
+"""Videos for the page: small, short, quiet, and playable."""
+
+import functools
+import html.parser
+import http.server
+import re
+import shutil
+import subprocess
+import sys
+import threading
+
+import imageio_ffmpeg
+import mediapy
+import numpy as np
+import pytest
+
+from inbounds.book import videos
+from inbounds.robots import Film
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+def film(seconds: float = 1.0, fps: float = 25.0, shape=(48, 64), noise: int = 0) -> Film:
+    """A dark film whose first frame is bright, with optional noise that is hard to compress."""
+    rng = np.random.default_rng(0)
+    frames = np.full((round(seconds * fps), *shape, 3), 60, np.uint8)
+    frames[0] = 200
+    if noise:
+        frames += rng.integers(0, noise, frames.shape, dtype=np.uint8)
+    return Film(frames, fps, 0.0)
+
+
+def read(mp4: bytes, tmp_path) -> tuple[str, np.ndarray]:
+    """ffmpeg's description of an MP4's stream, and its frames [T, 48, 64, 3]."""
+    path = tmp_path / "film.mp4"
+    path.write_bytes(mp4)
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    stream = next(line for line in done.stderr.decode().splitlines() if "Video:" in line)
+    return stream, np.frombuffer(done.stdout, np.uint8).reshape(-1, 48, 64, 3)
+
+
+def test_the_encoding_is_what_browsers_play(tmp_path):
+    (video,) = videos.show_films({"One": film()})
+    stream, frames = read(video.mp4, tmp_path)
+    for property_ in ("h264", "yuv420p", "64x48", "25 fps"):
+        assert property_ in stream
+    assert len(frames) == 25
+    assert frames[0].mean() == pytest.approx(200, abs=4)  # it starts with frame 0
+    assert frames[1].mean() == pytest.approx(60, abs=4)
+    # the index precedes the data, so that the duration is known early
+    assert video.mp4.index(b"moov") < video.mp4.index(b"mdat")
+
+
+def test_encoding_is_deterministic():
+    first, again = (videos.show_films({"One": film(noise=9)})._repr_html_() for _ in range(2))
+    assert first == again
+
+
+def test_the_text_form_names_the_videos():
+    assert repr(videos.show_films({"A": film()})) == "<1 video: 'A'>"
+    assert repr(videos.show_films({"A": film(), "B": film()})) == "<2 videos: 'A', 'B'>"
+
+
+class Tags(html.parser.HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: dict[str, list[dict]] = {}
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.setdefault(tag, []).append(dict(attrs))
+
+
+def test_the_page_shows_it_quietly():
+    text = videos.show_films({"Gaussian": film(), 'σ < 1 & "more"': film()})._repr_html_()
+    tags = Tags(text).found
+    assert len(tags["video"]) == len(tags["figure"]) == len(tags["figcaption"]) == 2
+    for video in tags["video"]:
+        assert {"controls", "muted", "playsinline"} <= video.keys()
+        assert not {"autoplay", "loop"} & video.keys()
+        assert video["preload"] == "metadata"
+        assert video["poster"].startswith("data:image/jpeg;base64,")
+        assert "width" not in video, "a fixed width would overflow a phone"
+        assert "max-width" not in video["style"]
+    assert tags["video"][1]["aria-label"].endswith('σ < 1 & "more"')
+    assert "σ &lt; 1 &amp; &quot;more&quot;</figcaption>" in text
+    assert "flex-wrap:wrap" in tags["div"][0]["style"]
+    assert "color" not in text.split("base64")[0]  # theme-neutral
+    assert not re.search(r"https?://", text)
+
+
+def test_the_poster_is_the_first_frame():
+    (video,) = videos.show_films({"One": film()})
+    assert mediapy.decompress_image(video.poster).mean() == pytest.approx(200, abs=4)
+
+
+def test_a_film_hard_to_compress_is_encoded_more_coarsely():
+    hard = film(seconds=2.0, shape=(96, 128), noise=120)
+    assert len(videos._encode(hard, 30)) > videos.MAX_BYTES
+    (video,) = videos.show_films({"Noise": hard})
+    assert len(video.mp4) <= videos.MAX_BYTES
+
+
+def test_a_film_too_large_is_refused():
+    with pytest.raises(ValueError, match=r"'Noise' takes \d+ kB, a page allows 120 kB: record fewer"):
+        videos.show_films({"Noise": film(seconds=2.0, shape=(240, 320), noise=190)})
+
+
+def test_a_film_too_long_is_refused():
+    videos.show_films({"Five": film(seconds=5.0)})
+    with pytest.raises(ValueError, match=r"lasts 5\.2 s, a page allows 5 s"):
+        videos.show_films({"Long": film(seconds=5.2)})
+
+
+def test_odd_sizes_and_empty_rows_are_refused():
+    with pytest.raises(ValueError, match="must be even"):
+        videos.show_films({"Odd": film(shape=(48, 63))})
+    with pytest.raises(ValueError, match="no film"):
+        videos.show_films({})
+
+
+def test_files_may_be_longer_and_are_finer(tmp_path):
+    long = film(seconds=6.0, noise=20)
+    path = videos.write_film(tmp_path / "run.mp4", long)
+    _, frames = read(path.read_bytes(), tmp_path)
+    assert len(frames) == 150
+    assert len(path.read_bytes()) > len(videos._encode(long, 30))
+
+
+def test_missing_ffmpeg_names_the_fix(monkeypatch):
+    def nothing() -> str:
+        raise RuntimeError("No ffmpeg exe could be found.")
+
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", nothing)
+    with pytest.raises(RuntimeError, match=r"pip install .*imageio-ffmpeg"):
+        videos.show_films({"One": film()})
+
+
+def test_missing_mediapy_names_the_fix(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mediapy", None)
+    with pytest.raises(RuntimeError, match=r"mediapy: pip install 'inbounds\[book\]'"):
+        videos.show_films({"One": film()})
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_chromium_plays_it_on_a_phone(tmp_path):
+    from playwright.sync_api import sync_playwright
+
+    row = videos.show_films({"One": film(shape=(240, 320)), "Two": film(shape=(240, 320))})
+    page_html = f'<!doctype html><meta name="viewport" content="width=device-width"><body>{row._repr_html_()}'
+    (tmp_path / "index.html").write_text(page_html, encoding="utf8")
+    handler = functools.partial(QuietHandler, directory=str(tmp_path))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        with sync_playwright() as play:
+            browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            page = browser.new_page(viewport={"width": 320, "height": 640})
+            page.goto(f"http://127.0.0.1:{server.server_port}/index.html")
+            page.wait_for_function("[...document.querySelectorAll('video')].every(v => v.readyState >= 1)")
+            assert page.evaluate("document.documentElement.scrollWidth") <= 320
+            start = page.evaluate(
+                "[...document.querySelectorAll('video')].map(v => [v.paused, v.currentTime])"
+            )
+            assert start == [[True, 0], [True, 0]]
+            assert page.evaluate("document.querySelector('video').duration") == pytest.approx(1.0, abs=0.05)
+            page.evaluate("document.querySelector('video').play()")
+            page.wait_for_function("document.querySelector('video').ended", timeout=10_000)
+            browser.close()
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class QuietHandler(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *args) -> None:
+        pass
