@@ -1,0 +1,254 @@
+"""What the bounded distributions share: the interval [low, high], its checks, and arithmetic close to its ends.
+
+A bounded action lives between two numbers that the robot gives (`space.low`, `space.high`). Each law of this
+package is a `BoundedDistribution`: elementwise over broadcast parameters, with `low` and `high` among them.
+Floating point is the enemy near a bound, and three rules answer it:
+
+* a distance to a bound is computed from *that* bound: `value - low` near low, `high - value` near high;
+* a value that came from a latent lies strictly inside: what rounding puts on a bound is moved to the nearest
+  floating-point number inside, so a law with an open support can score its own samples;
+* what must be exact is computed from the latent, never from the value (a float32 value next to its bound has
+  forgotten its latent).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Self, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+from torch.distributions import Distribution, constraints
+
+__all__ = ["BoundedDistribution", "OpenInterval", "TensorLike", "as_parameters", "require_equal_bounds"]
+
+TensorLike: TypeAlias = Tensor | float | npt.NDArray[Any]
+
+
+class OpenInterval(constraints.Constraint):
+    """Constrain to low < value < high, both ends excluded.
+
+    Args:
+        low: `[...]` lower bound.
+        high: `[...]` upper bound.
+
+    Example:
+        >>> import torch
+        >>> OpenInterval(0.0, 1.0).check(torch.tensor([0.0, 0.5, 1.0])).tolist()
+        [False, True, False]
+    """
+
+    def __init__(self, low: Tensor | float, high: Tensor | float) -> None:
+        self.lower_bound, self.upper_bound = low, high
+        super().__init__()
+
+    def check(self, value: Tensor) -> Tensor:
+        """Return, elementwise, whether value lies strictly between the bounds."""
+        return (self.lower_bound < value) & (value < self.upper_bound)
+
+    def __repr__(self) -> str:
+        return f"OpenInterval(low={self.lower_bound}, high={self.upper_bound})"
+
+
+class BoundedDistribution(Distribution):
+    """Base of the laws on an interval: parameters broadcast against the bounds, `expand`, checked samples.
+
+    A subclass names its parameters in `arg_constraints` (bounds included) and passes all of them here.
+
+    Args:
+        validate_args: check parameters and values (None: as `torch.distributions` is set, on by default). Inside
+            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor.
+        **parameters: `[...]` each; numbers, tensors or arrays that broadcast together, `low` and `high` among them.
+
+    Raises:
+        ValueError: shapes that do not broadcast; under validation also a parameter outside its constraint, bounds
+            that are infinite, NaN or out of order, or that leave no floating-point number between them.
+    """
+
+    low: Tensor
+    high: Tensor
+
+    def __init__(self, *, validate_args: bool | None = None, **parameters: TensorLike) -> None:
+        for name, value in as_parameters(**parameters).items():
+            setattr(self, name, value)
+        if validate_args if validate_args is not None else self._validate_args:
+            _check_bounds(type(self).__name__, self.low, self.high)
+        super().__init__(self.low.shape, validate_args=validate_args)
+
+    def expand(self, batch_shape: Any, _instance: Any = None) -> Self:
+        """Return this distribution with its parameters expanded to `batch_shape` (no memory is copied)."""
+        new = self._get_checked_instance(type(self), _instance)
+        batch_shape = torch.Size(batch_shape)
+        for name in self.arg_constraints:
+            setattr(new, name, getattr(self, name).expand(batch_shape))
+        Distribution.__init__(new, batch_shape, validate_args=False)
+        new._validate_args = self._validate_args
+        return new
+
+    @property
+    def width(self) -> Tensor:
+        """`[...]` length of the interval, high − low, in units of the action."""
+        return self.high - self.low
+
+    @constraints.dependent_property(is_discrete=False, event_dim=0)
+    def support(self) -> constraints.Constraint:
+        """The open interval (low, high)."""
+        return OpenInterval(self.low, self.high)
+
+    def sample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
+        """Return samples `[*sample_shape, ...]`, cut off from the graph; see `rsample`."""
+        with torch.no_grad():
+            return self.rsample(sample_shape, generator)
+
+    def rsample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
+        """Return reparametrised samples `[*sample_shape, ...]`, drawn by `rsample_latent`.
+
+        Args:
+            sample_shape: leading shape of the samples.
+            generator: source of randomness; None is torch's global one.
+
+        Returns:
+            `[*sample_shape, ...]` values in the support, differentiable in the parameters.
+        """
+        return self.latent_to_value(self.rsample_latent(sample_shape, generator))
+
+    def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
+        """Return reparametrised latents `[*sample_shape, ...]`; the subclass says what its latent is."""
+        raise NotImplementedError
+
+    def latent_to_value(self, latent: Tensor) -> Tensor:
+        """Return the value that a latent stands for; the subclass says which map that is."""
+        raise NotImplementedError
+
+    def _standard_normal(self, sample_shape: Any, generator: torch.Generator | None) -> Tensor:
+        shape = self._extended_shape(torch.Size(sample_shape))
+        return torch.randn(shape, dtype=self.low.dtype, device=self.low.device, generator=generator)
+
+    def _from_unit(self, fraction: Tensor, complement: Tensor) -> Tensor:
+        """Map fraction of the width (and complement = 1 − fraction, computed without loss) strictly inside."""
+        value = torch.where(
+            fraction < 0.5, self.low + self.width * fraction, self.high - self.width * complement
+        )
+        smallest, largest = _open_ends(self.low, self.high)
+        return torch.clamp(value, smallest, largest)
+
+    def _distances(self, value: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return value − low and high − value, positive everywhere, and which values lie outside (low, high).
+
+        Outside, the distances are those of the midpoint, so that neither the value nor the gradient of what is
+        computed from them is NaN; the caller masks it.
+        """
+        outside = (value <= self.low) | (value >= self.high)
+        safe = torch.where(outside, self.low + self.width / 2, value)
+        return safe - self.low, self.high - safe, outside
+
+    def _validate_sample(self, value: Tensor) -> None:
+        try:
+            super()._validate_sample(value)
+        except ValueError as error:
+            if "support" not in str(error):
+                raise
+            raise ValueError(
+                f"{error}\nKeep the latent of a sample (rsample_latent, log_prob_latent) instead of reading it back "
+                "from a value that was rounded or clipped, or pass validate_args=False: outside the support "
+                "log_prob is then -inf."
+            ) from None
+
+
+def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
+    """Return the parameters as tensors of one floating type, one device and one shape.
+
+    The type is that of the law's own tensors (the bounds are cast to it; numbers adapt), or torch's default.
+
+    Args:
+        **parameters: numbers, tensors or arrays that broadcast together.
+
+    Returns:
+        The same names with tensors `[...]`.
+
+    Raises:
+        ValueError: the shapes do not broadcast.
+
+    Example:
+        >>> import numpy as np, torch
+        >>> parameters = as_parameters(loc=torch.zeros(3), low=np.array([-1.0, -2.0, -3.0]), high=1.0)
+        >>> parameters["low"].tolist(), parameters["low"].dtype, parameters["high"].shape
+        ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
+    """
+    given = {
+        name: torch.as_tensor(value) if isinstance(value, np.ndarray | np.generic) else value
+        for name, value in parameters.items()
+    }
+    own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]
+    leading = own or [v for v in given.values() if isinstance(v, Tensor)]
+    dtype = leading[0].dtype if leading else torch.get_default_dtype()
+    for tensor in leading[1:]:
+        dtype = torch.promote_types(dtype, tensor.dtype)
+    if not dtype.is_floating_point:
+        dtype = torch.get_default_dtype()
+    device = leading[0].device if leading else None
+    tensors = [torch.as_tensor(value, dtype=dtype, device=device) for value in given.values()]
+    try:
+        tensors = list(torch.broadcast_tensors(*tensors))
+    except RuntimeError:
+        shapes = ", ".join(f"{name} {list(t.shape)}" for name, t in zip(given, tensors, strict=True))
+        raise ValueError(
+            f"these shapes do not broadcast: {shapes}. Give bounds of shape [] or [act_dim] and parameters "
+            "of shape [..., act_dim]."
+        ) from None
+    return dict(zip(given, tensors, strict=True))
+
+
+def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None:
+    """Raise unless p and q live on the same interval: otherwise their KL divergence is infinite or meaningless.
+
+    Args:
+        p: a law with bounds.
+        q: another.
+
+    Raises:
+        ValueError: the bounds differ anywhere.
+    """
+    if bool(((p.low != q.low) | (p.high != q.high)).any()):
+        raise ValueError(
+            "the KL divergence needs equal bounds, but "
+            f"p has low={p.low.tolist()}, high={p.high.tolist()} and q has low={q.low.tolist()}, "
+            f"high={q.high.tolist()}. Build both from the same action space."
+        )
+
+
+def _open_ends(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the smallest and the largest floating-point number strictly between low and high."""
+    low, high = low.detach(), high.detach()
+    return torch.nextafter(low, high), torch.nextafter(high, low)
+
+
+def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:
+    def complain(bad: Tensor, problem: str, remedy: str) -> None:
+        if bool(bad.any()):
+            index = tuple(bad.nonzero()[0].tolist())
+            where = f" at index {index}" if index else ""
+            raise ValueError(
+                f"{name}: {problem}, but low={low[index].item()}, high={high[index].item()}{where}. {remedy}"
+            )
+
+    complain(
+        ~(torch.isfinite(low) & torch.isfinite(high)),
+        "the bounds must be finite",
+        "An unbounded action needs no bounded law: use a Normal, or choose finite bounds.",
+    )
+    complain(
+        low >= high, "low must be less than high", "Swap the bounds, or drop the action that has no range."
+    )
+    complain(
+        torch.isinf(high - low),
+        "the interval's length overflows",
+        "Use float64, or choose bounds closer together.",
+    )
+    smallest, largest = _open_ends(low, high)
+    complain(
+        smallest > largest,
+        f"no {low.dtype} number lies strictly between the bounds",
+        "Use float64, or move the interval closer to zero.",
+    )

@@ -1,0 +1,187 @@
+r"""Expectations under a Normal, by quadrature.
+
+For z = μ + σ x with x ~ N(0, 1), every rule here is a finite sum
+
+$$ E[f(z)] = ∫ f(μ + σ x) φ(x) dx ≈ Σ_i w_i f(μ + σ x_i), $$
+
+and the rules differ only in the nodes x_i and the weights w_i:
+
+* `trapezoid` — equal steps on ±8.5 standard deviations. On a smooth function that dies off at both ends
+  the trapezoid rule converges geometrically: its error is about exp(−2πd/h) for a step h and a function
+  analytic in a strip of half-width d (Trefethen & Weideman 2014, section 5). For f = sigmoid the nearest pole
+  is z = ±iπ, so d = π/σ: a hundred nodes are enough for every σ ≤ e.
+* `gauss_hermite` — exact for polynomials, for comparison. The sigmoid is no polynomial: beyond σ ≈ 1 the rule
+  needs many nodes (chapter 2 measures both).
+* `graded_trapezoid` — the trapezoid rule after x = x₀ + sinh(u)/r, which crowds the nodes around z = 0, where
+  sigmoid and softplus bend, once σ is wide. It is the plain rule for small σ and still right where σ is in the
+  thousands. The distributions of this package use it.
+
+Nodes and weights are constants to autograd: a derivative of the sum is the same rule applied to the derivative
+of f (the pathwise derivative), so differentiating twice costs no accuracy.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+__all__ = ["Rule", "expectation", "gauss_hermite", "graded_trapezoid", "trapezoid"]
+
+
+class Rule(NamedTuple):
+    """Nodes and weights of a quadrature rule for the standard Normal.
+
+    Args:
+        nodes: `[..., N]` standardised nodes x_i.
+        weights: `[..., N]` weights w_i; they sum to one up to the rule's error.
+    """
+
+    nodes: Tensor
+    weights: Tensor
+
+
+def expectation(function: Callable[[Tensor], Tensor], loc: Tensor, scale: Tensor, rule: Rule) -> Tensor:
+    """Return E[function(z)] for z ~ Normal(loc, scale), differentiable in loc, scale and what function holds.
+
+    Args:
+        function: elementwise map from latents `[..., N]` to values `[..., N]`; what else it holds and broadcasts
+            against them needs a last axis of one.
+        loc: `[...]` mean of the Normal.
+        scale: `[...]` its standard deviation.
+        rule: nodes and weights, `[N]` (shared) or `[..., N]` (one rule per Normal).
+
+    Returns:
+        `[...]` the expectations.
+
+    Example:
+        >>> import torch
+        >>> loc, scale = torch.tensor([0.5, -2.0]).double(), torch.tensor([0.3, 1.5]).double()
+        >>> second_moment = expectation(torch.square, loc, scale, trapezoid())  # loc² + scale²
+        >>> [round(x, 6) for x in second_moment.tolist()]
+        [0.34, 6.25]
+    """
+    latent = loc.unsqueeze(-1) + scale.unsqueeze(-1) * rule.nodes  # [..., N]
+    return (rule.weights * function(latent)).sum(-1)
+
+
+def trapezoid(
+    num_nodes: int = 101,
+    half_width: float = 8.5,
+    dtype: torch.dtype = torch.float64,
+    device: torch.device | str = "cpu",
+) -> Rule:
+    """Return the trapezoid rule on ±half_width standard deviations.
+
+    The end nodes carry half a step, and so little of the Normal's mass that nobody will ever know.
+
+    Args:
+        num_nodes: number of nodes N, at least 2.
+        half_width: where the line is cut, in standard deviations; P(|x| > 8.5) is 2e-17.
+        dtype: floating type of the rule.
+        device: device of the rule.
+
+    Returns:
+        A rule with `[N]` nodes and weights.
+
+    Raises:
+        ValueError: fewer than two nodes, or a half-width that is not positive.
+
+    Example:
+        >>> rule = trapezoid(num_nodes=5, half_width=4.0)
+        >>> rule.nodes.tolist()
+        [-4.0, -2.0, 0.0, 2.0, 4.0]
+    """
+    if num_nodes < 2 or not half_width > 0:
+        raise ValueError(
+            f"the trapezoid rule needs num_nodes >= 2 and half_width > 0, got {num_nodes} and {half_width}"
+        )
+    nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype, device=device)
+    step = 2 * half_width / (num_nodes - 1)
+    weights = step * _standard_normal_density(nodes)
+    weights[[0, -1]] /= 2
+    return Rule(nodes, weights)
+
+
+def gauss_hermite(
+    num_nodes: int = 101, dtype: torch.dtype = torch.float64, device: torch.device | str = "cpu"
+) -> Rule:
+    """Return the Gauss-Hermite rule: exact where function is a polynomial of degree below 2 num_nodes.
+
+    Args:
+        num_nodes: number of nodes N, at least 1.
+        dtype: floating type of the rule.
+        device: device of the rule.
+
+    Returns:
+        A rule with `[N]` nodes and weights.
+
+    Raises:
+        ValueError: less than one node.
+
+    Example:
+        >>> nodes, weights = gauss_hermite(3)
+        >>> round(float((weights * nodes**4).sum()), 10)  # E[x⁴] = 3
+        3.0
+    """
+    if num_nodes < 1:
+        raise ValueError(f"the Gauss-Hermite rule needs num_nodes >= 1, got {num_nodes}")
+    nodes, weights = np.polynomial.hermite_e.hermegauss(num_nodes)  # weight function exp(−x²/2)
+    return Rule(
+        torch.as_tensor(nodes, dtype=dtype, device=device),
+        torch.as_tensor(weights / math.sqrt(2 * math.pi), dtype=dtype, device=device),
+    )
+
+
+@torch.no_grad()
+def graded_trapezoid(
+    loc: Tensor, scale: Tensor, num_nodes: int | None = None, half_width: float | None = None
+) -> Rule:
+    """Return, for each Normal, a trapezoid rule whose nodes crowd around z = 0 where its scale is wide.
+
+    With x = x₀ + sinh(u)/r and equal steps in u, the steps in z = μ + σx are nearly equal within 2π of z = 0 and
+    grow in proportion to |z| beyond. x₀ is the point of ±half_width closest to z = 0, and r = σ/2π. As r → 0 the
+    plain rule comes back.
+
+    Measured on mean, variance and entropy of the logit-normal with 128 nodes on ±10: relative error below
+    1e-12 for log σ ≤ 1 and |μ| ≤ 15, and below 1e-8 up to log σ = 12, first and second derivatives alike
+    (`tests/distributions/test_quadrature.py`).
+
+    Args:
+        loc: `[...]` means μ, in latent units.
+        scale: `[...]` standard deviations σ.
+        num_nodes: number of nodes N; by default 128 in float64 and 48 in any shorter type.
+        half_width: cut in standard deviations; by default 10 in float64 and 7 in any shorter type. Wider than
+            8.5, so that *relative* accuracy survives where f grows like exp(2z) over the range that matters.
+
+    Returns:
+        A rule with `[..., N]` nodes and weights, constant to autograd.
+
+    Example:
+        >>> import torch
+        >>> loc, scale = torch.tensor(1.0).double(), torch.tensor(1000.0).double()
+        >>> mean = expectation(torch.sigmoid, loc, scale, graded_trapezoid(loc, scale))
+        >>> round(float(mean), 6)  # half, and a little to the right
+        0.500399
+    """
+    double = torch.promote_types(loc.dtype, scale.dtype) == torch.float64
+    num_nodes = num_nodes or (128 if double else 48)
+    half_width = half_width or (10.0 if double else 7.0)
+    loc, scale = loc.detach().unsqueeze(-1), scale.detach().unsqueeze(-1)
+    centre = (-loc / scale).clamp(-half_width, half_width)
+    rate = scale / (2 * math.pi)
+    start = torch.asinh(rate * (-half_width - centre))
+    stop = torch.asinh(rate * (half_width - centre))
+    u = start + (stop - start) * torch.linspace(
+        0, 1, num_nodes, dtype=loc.dtype, device=loc.device
+    )  # [..., N]
+    nodes = centre + torch.sinh(u) / rate
+    step = (stop - start) / (num_nodes - 1)
+    weights = step * torch.cosh(u) / rate * _standard_normal_density(nodes)
+    return Rule(nodes, weights)
+
+
+def _standard_normal_density(x: Tensor) -> Tensor:
+    return torch.exp(-x.square() / 2) / math.sqrt(2 * math.pi)
