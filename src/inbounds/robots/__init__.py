@@ -8,16 +8,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from inbounds.robots.messages import MujocoWarning
+    from inbounds.robots.registration import make
     from inbounds.robots.rendering import Camera, Film, RobotRenderer, record
+    from inbounds.robots.vector_env import TASKS, RobotVectorEnv
 
 _HOME = {
+    "TASKS": "vector_env",
     "Camera": "rendering",
     "Film": "rendering",
+    "MujocoWarning": "messages",
     "RobotRenderer": "rendering",
+    "RobotVectorEnv": "vector_env",
+    "make": "registration",
     "record": "rendering",
 }
 
-__all__ = ["Camera", "Film", "RobotRenderer", "record"]
+__all__ = ["TASKS", "Camera", "Film", "MujocoWarning", "RobotRenderer", "RobotVectorEnv", "make", "record"]
 
 
 def __getattr__(name: str) -> Any:

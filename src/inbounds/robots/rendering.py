@@ -86,6 +86,7 @@ class RobotRenderer:
         self, env: Any, *, index: int = 0, width: int = 320, height: int = 240, camera: Camera | None = None
     ) -> None:
         headless.require_backend()
+        self._index = index
         model, self._get_data = _simulation(env, index)
         self._model = _quick_to_draw(model, width, height)
         self._data = mujoco.MjData(self._model)
@@ -100,9 +101,14 @@ class RobotRenderer:
         is_flat = height_range < 0.1 * self._radius  # as Swimmer is: seen from above
         self._view = self._make_view(camera or Camera(elevation=-40.0 if is_flat else -15.0))
 
-    def frame(self) -> Frame:
-        """The robot as it stands now, ``[height, width, 3]``, a new array."""
-        mujoco.mj_getState(self._model, self._get_data(), self._state, _STATE)
+    def frame(self, index: int | None = None) -> Frame:
+        """The robot as it stands now, ``[height, width, 3]``, a new array.
+
+        Args:
+            index: which robot of a vector environment; by default the renderer's own.
+        """
+        data = self._get_data(self._index if index is None else index)
+        mujoco.mj_getState(self._model, data, self._state, _STATE)
         mujoco.mj_setState(self._model, self._data, self._state, _STATE)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
@@ -197,22 +203,21 @@ def record(
     return Film(np.stack(frames), 1 / (stride * step_time), total_reward)
 
 
-def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[], mujoco.MjData]]:
-    """The model of an environment, and a function that returns one robot's present data."""
+def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], mujoco.MjData]]:
+    """The model of an environment, and a function from a robot's index to its present data."""
     count = getattr(env, "num_envs", 1)
     if not 0 <= index < count:
         raise IndexError(f"index {index} is out of range: this environment has robots 0 to {count - 1}")
     inner = env.unwrapped
     if hasattr(inner, "get_data"):  # this package's vector environments
-        return inner.model, lambda: inner.get_data(index)
-    if hasattr(inner, "envs"):  # gymnasium.vector.SyncVectorEnv
-        inner = inner.envs[index].unwrapped
-    if not isinstance(getattr(inner, "model", None), mujoco.MjModel):
+        return inner.model, inner.get_data
+    singles = [single.unwrapped for single in getattr(inner, "envs", [inner])]  # SyncVectorEnv has several
+    if not all(isinstance(getattr(single, "model", None), mujoco.MjModel) for single in singles):
         raise TypeError(
             f"{type(inner).__name__} gives no access to a MuJoCo simulation: use gymnasium.make(...), "
             "SyncVectorEnv or inbounds.robots.make(...)"
         )
-    return inner.model, lambda: inner.data
+    return singles[index].model, lambda i: singles[i].data
 
 
 def _step_time(env: Any) -> float:
