@@ -1,0 +1,185 @@
+"""Graders for the exercises: they run the reader's function and say what is wrong, in words.
+
+Each grader is named after the exercise's function, and returns a :class:`Verdict` that a notebook shows. An exercise that has
+not been answered (its function still returns ``...``) is not a failure: *Run All* goes on.
+
+The references here are written differently from the chapters' solutions, so that a slip in one is not a slip in both.
+"""
+
+import html
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from scipy import integrate, stats
+
+from inbounds.distributions import LogitNormal
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a grader found."""
+
+    exercise: str
+    """Name of the reader's function."""
+    passed: bool | None
+    """True, False, or None for an exercise not yet answered."""
+    message: str
+    """One sentence: what was checked, or what is wrong."""
+
+    def __repr__(self) -> str:
+        mark = {True: "✓ passed", False: "✗ not yet", None: "… not answered"}[self.passed]
+        return f"{mark}: {self.exercise}: {self.message}"
+
+    def _repr_html_(self) -> str:
+        kind = {True: "tip", False: "warning", None: "note"}[self.passed]
+        title, _, text = repr(self).partition(": ")
+        return (
+            f'<div class="admonition {kind}"><p class="admonition-title">{title}</p>'
+            f"<p><code>{html.escape(self.exercise)}</code>: {html.escape(text.partition(': ')[2])}</p></div>"
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One call of the reader's function, what it should return, and what known mistakes would return."""
+
+    arguments: tuple[Any, ...]
+    expected: Any
+    mistakes: dict[str, Any]
+    """Diagnosis → the wrong value that betrays it."""
+    hint: str = "the value is wrong"
+    """What to say when the value is wrong in no known way."""
+    rtol: float = 1e-6
+
+
+def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verdict:
+    """Run every case; stop at the first wrong value and name the mistake behind it, if it is a known one.
+
+    Args:
+        function: the reader's.
+        cases: in the order in which they should fail.
+        success: what to say when all is right.
+
+    Example:
+        >>> square = Case((3.0,), 9.0, {"that is the double, not the square": 6.0})
+        >>> judge(lambda x: 2 * x, [square], "squares are right")
+        ✗ not yet: <lambda>: that is the double, not the square
+    """
+    name = getattr(function, "__name__", "your function")
+    for case in cases:
+        try:
+            answer = function(*case.arguments)
+        except Exception as error:
+            return Verdict(name, False, f"it raised {type(error).__name__}: {error}")
+        if answer is ... or answer is None or answer is NotImplemented:
+            return Verdict(name, None, "write it, and run this cell again")
+        if agrees(answer, case.expected, case.rtol):
+            continue
+        for diagnosis, wrong in case.mistakes.items():
+            if agrees(answer, wrong, case.rtol):
+                return Verdict(name, False, diagnosis)
+        return Verdict(name, False, f"{case.hint}: expected {brief(case.expected)}, got {brief(answer)}")
+    return Verdict(name, True, success)
+
+
+def agrees(answer: Any, expected: Any, rtol: float) -> bool:
+    """Whether two numbers or arrays have the same shape and values."""
+    try:
+        answer, expected = np.asarray(answer, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    except (TypeError, ValueError):
+        return False
+    return answer.shape == expected.shape and np.allclose(answer, expected, rtol=rtol, atol=0.0, equal_nan=True)
+
+
+def brief(value: Any) -> str:
+    """A value, short enough for a sentence."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return repr(value)[:60]
+    if array.size == 1:
+        return f"{array.item():.6g}"
+    return f"an array of shape {array.shape} that starts with {array.flat[0]:.6g}" if array.size else "nothing"
+
+
+def mass_outside(function: Callable[..., Any]) -> Verdict:
+    """Chapter *Actions have bounds*: the probability that some coordinate of a Gaussian action leaves its box."""
+
+    def case(loc: Any, scale: Any, low: Any, high: Any, **known: Any) -> Case:
+        loc, scale, low, high = (np.asarray(x, dtype=np.float64) for x in (loc, scale, low, high))
+        lower, upper = stats.norm.cdf(low, loc, scale), stats.norm.sf(high, loc, scale)
+        expected = -math.expm1(np.log1p(-(lower + upper)).sum())
+        mistakes = {
+            "that is the probability of leaving the box in *every* coordinate": np.prod(lower + upper),
+            "that is the sum over coordinates, an upper bound: they are not disjoint": np.sum(lower + upper),
+            "that is the probability of being *inside*": np.prod(1 - lower - upper),
+            "only the upper side is counted": 1 - np.prod(1 - upper),
+            "only the lower side is counted": 1 - np.prod(1 - lower),
+            "one probability per coordinate: combine them into one for the action": lower + upper,
+        }
+        return Case((loc, scale, low, high), expected, mistakes, **known)
+
+    cases = [
+        case([0.3, -0.2], [1.0, 0.5], [-1.0, -1.0], [1.0, 0.4]),
+        case([0.0, 0.0, 1.0], [2.0, 0.1, 1.0], [-1.0, -1.0, 0.0], [1.0, 1.0, 3.0]),
+        case(
+            [0.0, 0.0],
+            [0.1, 0.1],
+            [-1.0, -1.0],
+            [1.0, 1.0],
+            hint="tiny probabilities cancel: avoid 1 − (number near 1)",
+        ),
+    ]
+    return judge(function, cases, "right, down to the smallest probabilities")
+
+
+def log_prob_from_latent(function: Callable[..., Any]) -> Verdict:
+    """Chapter *The logit-normal density*: log-density of the action at ``g(latent)``, stable for large latents."""
+
+    def case(latent: float, loc: float, scale: float, low: float, high: float, **known: Any) -> Case:
+        arguments = tuple(torch.tensor(x, dtype=torch.float64) for x in (latent, loc, scale, low, high))
+        normal = stats.norm.logpdf(latent, loc, scale)
+        jacobian = -np.logaddexp(0.0, latent) - np.logaddexp(0.0, -latent)  # log s(z) + log s(−z)
+        length = math.log(high - low)
+        mistakes = {
+            "the Jacobian is missing: that is the Gaussian's density at the latent": normal,
+            "the sigmoid's derivative is missing; only the interval's length is there": normal - length,
+            "the interval's length is missing: the density is for (0, 1)": normal - jacobian,
+            "the Jacobian has the wrong sign: a density is *divided* by |da/dz|": normal + jacobian + length,
+            "the interval's length has the wrong sign": normal - jacobian + length,
+        }
+        return Case(arguments, normal - jacobian - length, mistakes, **known)
+
+    cases = [
+        case(0.4, 0.1, 0.7, -1.0, 1.0),
+        case(-1.3, 0.5, 2.0, 0.0, 5.0),
+        case(40.0, 38.0, 2.0, -1.0, 1.0, hint="at a latent of 40 the sigmoid is 1 to the last bit: use softplus or logsigmoid"),
+        case(-800.0, -790.0, 5.0, 0.0, 2.0, hint="at a latent of −800 the exponential overflows: use softplus or logsigmoid"),
+    ]
+    return judge(function, cases, "right, at the centre and far out")
+
+
+def entropy_by_quadrature(function: Callable[..., Any]) -> Verdict:
+    """Chapter *The logit-normal density*: differential entropy on (low, high)."""
+
+    def case(loc: float, scale: float, low: float, high: float) -> Case:
+        def surprise(z: float) -> float:
+            log_slope = -np.logaddexp(0.0, z) - np.logaddexp(0.0, -z) + math.log(high - low)
+            return float(stats.norm.pdf(z, loc, scale) * (log_slope - stats.norm.logpdf(z, loc, scale)))
+
+        expected = integrate.quad(surprise, loc - 12 * scale, loc + 12 * scale, epsabs=1e-12, limit=200)[0]
+        gaussian = stats.norm.entropy(loc, scale)
+        mistakes = {
+            "that is the Gaussian's entropy: entropy changes under the squashing": gaussian,
+            "the interval's length is missing: add log(high − low)": expected - math.log(high - low),
+            "the sign is wrong: entropy is minus the expected log-density": -expected,
+        }
+        return Case((loc, scale, low, high), expected, mistakes, rtol=1e-5)
+
+    cases = [case(0.0, 1.0, 0.0, 3.0), case(1.5, 0.4, -1.0, 1.0), case(-0.5, 2.7, -1.0, 1.0)]
+    reference = LogitNormal(torch.tensor(0.0), torch.tensor(1.0), 0.0, 3.0).entropy().item()
+    return judge(function, cases, f"right (LogitNormal.entropy() agrees: {reference:.4f} nats in the first case)")
