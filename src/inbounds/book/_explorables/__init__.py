@@ -1,0 +1,1 @@
+"""What explorables share (frame.py), and their mathematics in JavaScript (*.js)."""

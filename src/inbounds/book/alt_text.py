@@ -1,0 +1,89 @@
+"""Figures on a page, each with the text that a reader hears who cannot see it.
+
+:func:`show` displays a figure and puts its alt text into the output's metadata, where nbconvert looks for it. MyST-NB,
+which builds the book, learns to look there from :class:`AltTextRenderer`; the package registers that under the entry
+point ``myst_nb.mime_renderers``.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PIXELS_PER_INCH = 100
+"""CSS pixels that one inch of a figure takes up on the page; the image itself is twice as fine."""
+
+
+def png_bytes(fig: Figure, *, pixel_ratio: float = 2.0) -> bytes:
+    """A figure as PNG, the same bytes for the same figure (no date, no version in the file)."""
+    buffer = io.BytesIO()
+    fig.savefig(buffer, format="png", dpi=PIXELS_PER_INCH * pixel_ratio, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def svg_bytes(fig: Figure) -> bytes:
+    """A figure as SVG, its text as outlines, the same bytes for the same figure."""
+    import matplotlib as mpl
+
+    buffer = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "inbounds", "svg.fonttype": "path"}):
+        fig.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()
+
+
+def show(fig: Figure, alt: str) -> None:
+    """Put a figure on the page with its alt text, and close it.
+
+    The stored notebook keeps the alt text as the output's plain text, so a reader without pictures, and the
+    test that compares outputs, see what the figure claims.
+
+    Args:
+        fig: The figure.
+        alt: What a reader who cannot see the figure needs to know: what is plotted and what it shows.
+            Numbers that vary from machine to machine have no place in it.
+
+    Raises:
+        ValueError: If the alt text says less than a sentence would.
+    """
+    import matplotlib.pyplot as plt
+    from IPython.display import display
+
+    alt = " ".join(alt.split())
+    if len(alt.split()) < 4:
+        raise ValueError(
+            f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
+        )
+    png = base64.b64encode(png_bytes(fig)).decode("ascii")
+    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
+    plt.close(fig)
+    display(
+        {"image/png": png, "text/plain": f"Figure: {alt}"},
+        metadata={"image/png": {"alt": alt, "width": width}},
+        raw=True,
+    )
+
+
+class AltTextRenderer:
+    """MyST-NB plugin: an image output's ``alt`` metadata becomes the ``alt`` of the page's ``<img>``.
+
+    MyST-NB 1.4 takes width and height from an output's metadata, but not the alt text (``NbElementRenderer.
+    render_image``). It asks plugins first, so this one lets it render the image and adds what is missing.
+    """
+
+    mime_priority_overrides: ClassVar[Sequence[tuple[str, str, int | None]]] = ()
+
+    @staticmethod
+    def handle_mime(renderer: Any, data: Any, inline: bool) -> list[Any] | None:
+        """Render an image that carries alt text; leave every other output to MyST-NB (None)."""
+        alt = data.output_metadata.get(data.mime_type, {}).get("alt")
+        if alt is None or not data.mime_type.startswith("image/"):
+            return None
+        rendered: list[Any] = renderer.render_image_inline(data) if inline else renderer.render_image(data)
+        for node in rendered:
+            node["alt"] = alt
+        return rendered
