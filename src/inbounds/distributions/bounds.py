@@ -5,8 +5,7 @@ package is a `BoundedDistribution`: elementwise over broadcast parameters, with 
 Floating point is the enemy near a bound, and three rules answer it:
 
 * a distance to a bound is computed from *that* bound: `value - low` near low, `high - value` near high;
-* a value that came from a latent lies strictly inside: what rounding puts on a bound is moved to the nearest
-  floating-point number inside, so a law with an open support can score its own samples;
+* where the support is open, no sample is on a bound (`SigmoidMapped`), so that a law can score its own samples;
 * what must be exact is computed from the latent, never from the value (a float32 value next to its bound has
   forgotten its latent).
 """
@@ -21,7 +20,14 @@ import torch
 from torch import Tensor
 from torch.distributions import Distribution, constraints
 
-__all__ = ["BoundedDistribution", "OpenInterval", "TensorLike", "as_parameters", "require_equal_bounds"]
+__all__ = [
+    "BoundedDistribution",
+    "OpenInterval",
+    "SigmoidMapped",
+    "TensorLike",
+    "as_parameters",
+    "require_equal_bounds",
+]
 
 TensorLike: TypeAlias = Tensor | float | npt.NDArray[Any]
 
@@ -91,11 +97,6 @@ class BoundedDistribution(Distribution):
         """`[...]` length of the interval, high − low, in units of the action."""
         return self.high - self.low
 
-    @constraints.dependent_property(is_discrete=False, event_dim=0)
-    def support(self) -> constraints.Constraint:
-        """The open interval (low, high)."""
-        return OpenInterval(self.low, self.high)
-
     def sample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """Return samples `[*sample_shape, ...]`, cut off from the graph; see `rsample`."""
         with torch.no_grad():
@@ -125,24 +126,6 @@ class BoundedDistribution(Distribution):
         shape = self._extended_shape(torch.Size(sample_shape))
         return torch.randn(shape, dtype=self.low.dtype, device=self.low.device, generator=generator)
 
-    def _from_unit(self, fraction: Tensor, complement: Tensor) -> Tensor:
-        """Map fraction of the width (and complement = 1 − fraction, computed without loss) strictly inside."""
-        value = torch.where(
-            fraction < 0.5, self.low + self.width * fraction, self.high - self.width * complement
-        )
-        smallest, largest = _open_ends(self.low, self.high)
-        return torch.clamp(value, smallest, largest)
-
-    def _distances(self, value: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return value − low and high − value, positive everywhere, and which values lie outside (low, high).
-
-        Outside, the distances are those of the midpoint, so that neither the value nor the gradient of what is
-        computed from them is NaN; the caller masks it.
-        """
-        outside = (value <= self.low) | (value >= self.high)
-        safe = torch.where(outside, self.low + self.width / 2, value)
-        return safe - self.low, self.high - safe, outside
-
     def _validate_sample(self, value: Tensor) -> None:
         try:
             super()._validate_sample(value)
@@ -154,6 +137,52 @@ class BoundedDistribution(Distribution):
                 "from a value that was rounded or clipped, or pass validate_args=False: outside the support "
                 "log_prob is then -inf."
             ) from None
+
+
+class SigmoidMapped(BoundedDistribution):
+    """Base of the laws whose value is low + (high − low) · sigmoid(latent): a bijection of ℝ and the open interval.
+
+    A value that came from a latent lies strictly inside: what rounding would put on a bound is the nearest (normal)
+    floating-point number inside. So the law can score its own samples, if not exactly: see `log_prob_latent`.
+    """
+
+    @constraints.dependent_property(is_discrete=False, event_dim=0)
+    def support(self) -> constraints.Constraint:
+        """The open interval (low, high)."""
+        return OpenInterval(self.low, self.high)
+
+    def latent_to_value(self, latent: Tensor) -> Tensor:
+        """Return low + width · sigmoid(latent), strictly inside the bounds for every latent (±inf included).
+
+        Args:
+            latent: `[...]` latents, broadcast against the parameters.
+
+        Returns:
+            `[...]` values; each is measured from the bound that it is closer to.
+        """
+        fraction, complement = torch.sigmoid(latent), torch.sigmoid(-latent)
+        value = torch.where(
+            fraction < 0.5, self.low + self.width * fraction, self.high - self.width * complement
+        )
+        smallest, largest = _open_ends(self.low, self.high)
+        return torch.clamp(value, smallest, largest)
+
+    def value_to_latent(self, value: Tensor) -> Tensor:
+        """Return log(value − low) − log(high − value), `[...]`: the inverse, up to the rounding of the value.
+
+        It is ±inf on the bounds and NaN beyond them.
+        """
+        return torch.log(value - self.low) - torch.log(self.high - value)
+
+    def _distances(self, value: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return value − low and high − value, positive everywhere, and which values lie outside (low, high).
+
+        Outside, the distances are those of the midpoint, so that neither the value nor the gradient of what is
+        computed from them is NaN; the caller masks it.
+        """
+        outside = (value <= self.low) | (value >= self.high)
+        safe = torch.where(outside, self.low + self.width / 2, value)
+        return safe - self.low, self.high - safe, outside
 
 
 def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
@@ -177,7 +206,7 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
         ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
     """
     given = {
-        name: torch.as_tensor(value) if isinstance(value, np.ndarray | np.generic) else value
+        name: torch.tensor(value) if isinstance(value, np.ndarray | np.generic) else value
         for name, value in parameters.items()
     }
     own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]
@@ -219,9 +248,15 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
 
 
 def _open_ends(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the smallest and the largest floating-point number strictly between low and high."""
+    """Return the smallest and the largest normal floating-point number strictly between low and high.
+
+    Normal, because next to a bound at zero the subnormals have infinite reciprocals.
+    """
     low, high = low.detach(), high.detach()
-    return torch.nextafter(low, high), torch.nextafter(high, low)
+    tiny = torch.finfo(low.dtype).tiny
+    smallest = torch.maximum(torch.nextafter(low, high), low + tiny)
+    largest = torch.minimum(torch.nextafter(high, low), high - tiny)
+    return smallest, largest
 
 
 def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:

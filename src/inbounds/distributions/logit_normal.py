@@ -30,7 +30,7 @@ from torch import Tensor
 from torch.distributions import Normal, constraints, kl_divergence, register_kl
 from torch.nn.functional import logsigmoid
 
-from inbounds.distributions.bounds import BoundedDistribution, TensorLike, require_equal_bounds
+from inbounds.distributions.bounds import SigmoidMapped, TensorLike, require_equal_bounds
 from inbounds.distributions.quadrature import expectation, graded_trapezoid
 
 __all__ = ["LogitNormal"]
@@ -38,7 +38,7 @@ __all__ = ["LogitNormal"]
 _NEWTON_STEPS = 60  # quadratic, but for the cusp (μ = 0, σ² = 2), where each step only takes a third off
 
 
-class LogitNormal(BoundedDistribution):
+class LogitNormal(SigmoidMapped):
     r"""Law of low + (high − low) · sigmoid(z) for z ~ Normal(loc, scale); elementwise over broadcast parameters.
 
     **Edges of the support.** The support is the open interval. `log_prob` and `cdf` of a value on a bound or beyond
@@ -90,22 +90,11 @@ class LogitNormal(BoundedDistribution):
     ) -> None:
         super().__init__(loc=loc, scale=scale, low=low, high=high, validate_args=validate_args)
 
-    # ---- the latent, and the bijection between it and the value
+    # ---- the latent (its bijection with the value: SigmoidMapped)
 
     def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """Return latents z = loc + scale·ε, `[*sample_shape, ...]`; store these in a rollout, not the values."""
         return self.loc + self.scale * self._standard_normal(sample_shape, generator)
-
-    def latent_to_value(self, latent: Tensor) -> Tensor:
-        """Return low + width · sigmoid(latent), strictly inside the bounds for every latent (±inf included)."""
-        return self._from_unit(torch.sigmoid(latent), torch.sigmoid(-latent))
-
-    def value_to_latent(self, value: Tensor) -> Tensor:
-        """Return log(value − low) − log(high − value), `[...]`: the inverse, up to the rounding of the value.
-
-        It is ±inf on the bounds and NaN beyond them.
-        """
-        return torch.log(value - self.low) - torch.log(self.high - value)
 
     def log_prob_latent(self, latent: Tensor) -> Tensor:
         """Return log p(a) in nats at a = latent_to_value(latent): the density over *values*, read off the latent.
