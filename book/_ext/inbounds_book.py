@@ -2,23 +2,24 @@
 
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
-* BokehJS is copied from the installed bokeh package and loaded on the pages that show an explorable.
+* BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one.
+* Docstrings are read the way they are written (see ``shield`` and ``restore``).
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
 import os
+import re
 import shutil
 from pathlib import Path
 from typing import Any
 
-import bokeh
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
 from inbounds.book import explorables
 
-BOKEH_JS = Path(bokeh.__file__).parent / "server" / "static" / "js"
+FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
 
 
@@ -28,23 +29,48 @@ def use_named_cache(app: Sphinx, config: Config) -> None:
         config.nb_execution_cache_path = os.environ["INBOUNDS_NB_CACHE"]
 
 
-def copy_bokeh(app: Sphinx, exception: Exception | None) -> None:
-    """Serve BokehJS from the book itself."""
+def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
+    """Serve BokehJS and the explorables' scripts from the book itself."""
     if exception is None and app.builder.format == "html":
-        target = Path(app.outdir) / "_static" / "bokeh"
+        target = Path(app.outdir) / "_static" / FOLDER
         target.mkdir(parents=True, exist_ok=True)
-        for name in explorables.BOKEH_JS_FILES:
-            shutil.copy2(BOKEH_JS / name, target / name)
+        for script in explorables.javascript_files():
+            shutil.copy2(script, target / script.name)
 
 
 def choose_scripts(
     app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
-    """Drop thebe's scripts from every page; add BokehJS to the pages that need it."""
+    """Drop thebe's scripts from every page; add the explorables' scripts to the pages that need them."""
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
     if EXPLORABLE in context.get("body", ""):
-        for name in explorables.BOKEH_JS_FILES:
-            app.add_js_file(f"bokeh/{name}", priority=400)
+        for script in explorables.javascript_files():
+            app.add_js_file(f"{FOLDER}/{script.name}")
+
+
+SHIELDED: dict[str, list[str]] = {}
+
+
+def shield(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep one-line attribute docstrings from Napoleon, which reads ``Name: what it is`` as a type and its text."""
+    if what in ("attribute", "property", "data"):
+        SHIELDED[name] = lines[:]
+        lines.clear()
+
+
+def restore(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Give the shielded docstrings back, and let reStructuredText read mathematics as mathematics.
+
+    A docstring writes ``|μ|`` for an absolute value, where reStructuredText sees a substitution, and ``$$ ... $$`` on
+    a line of its own for a formula, as the notebooks do.
+    """
+    lines[:] = SHIELDED.pop(name, lines)
+    for i, line in enumerate(lines):
+        if formula := re.fullmatch(r"(\s*)\$\$(.*)\$\$\s*", line):
+            lines[i] = f"{formula[1]}.. math:: {formula[2].strip()}"
+        elif not re.match(r"\s*(>>>|\.\.\. |[|+])", line):
+            parts = re.split(r"(`+[^`]*`+)", line)
+            lines[i] = "".join(part if part.startswith("`") else part.replace("|", r"\|") for part in parts)
 
 
 def is_thebe(script: Any) -> bool:
@@ -57,5 +83,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers (called by Sphinx)."""
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
-    app.connect("build-finished", copy_bokeh)
+    app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500
+    app.connect("autodoc-process-docstring", restore, priority=600)
+    app.connect("build-finished", copy_explorables)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
