@@ -54,8 +54,8 @@ class Task:
     control_weight: ClassVar[float]
     healthy_reward: ClassVar[float] = 0.0
     """Paid at every healthy step; zero for a task that has no health and never terminates."""
-    velocity_limit: ClassVar[float] = np.inf
-    """Velocities are observed clipped to ± this."""
+    velocity_limit: ClassVar[float | None] = None
+    """Velocities are observed clipped to ± this [m/s, rad/s]."""
     reset_noise: ClassVar[float]
     reset_velocity_is_normal: ClassVar[bool] = False
     feels_contacts: ClassVar[bool] = False
@@ -75,7 +75,9 @@ class Task:
 
     def observe(self) -> Array:
         """What each robot sees now, ``[N, O]``, a new array."""
-        velocity = np.clip(self.qvel, -self.velocity_limit, self.velocity_limit)
+        velocity = self.qvel
+        if self.velocity_limit is not None:
+            velocity = np.minimum(np.maximum(velocity, -self.velocity_limit), self.velocity_limit)
         return np.concatenate((self.qpos[:, self.hidden :], velocity), axis=1)
 
     def position(self) -> Array:
@@ -111,7 +113,7 @@ class Task:
 
     def control_cost(self, action: Action) -> NDArray:
         """What the action costs, ``[N]``, in the action's precision."""
-        return self.control_weight * np.square(action).sum(axis=1)
+        return self.control_weight * squared_norm(action)
 
     def contact_cost(self) -> Array:
         """What the contacts cost, ``[N]``; only for a task that feels them."""
@@ -129,14 +131,11 @@ class Task:
 
     def draw_start(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """One robot's initial ``qpos [nq]`` and ``qvel [nv]``: the reference pose and a little noise."""
-        noise, nv = self.reset_noise, self.qvel.shape[1]
+        noise, count = self.reset_noise, (self.qvel.shape[1],)
         qpos = self.initial_qpos + rng.uniform(-noise, noise, self.initial_qpos.size)
-        qvel = (
-            noise * rng.standard_normal(nv)
-            if self.reset_velocity_is_normal
-            else rng.uniform(-noise, noise, nv)
-        )
-        return qpos, qvel
+        if self.reset_velocity_is_normal:
+            return qpos, noise * rng.standard_normal(count)
+        return qpos, rng.uniform(-noise, noise, count)
 
 
 class HalfCheetah(Task):
@@ -272,6 +271,17 @@ class Walker2d(Hopper):
         """Neither fallen nor flying, and upright."""
         height, pitch = self.qpos[:, 1], self.qpos[:, 2]
         return (height > 0.8) & (height < 2.0) & (np.abs(pitch) < 1.0)
+
+
+def squared_norm(rows: NDArray[Any]) -> NDArray[Any]:
+    """Sum of squares of each row, in the order of NumPy's sum over one row: ``[N, K] → [N]``.
+
+    Example:
+        >>> squared_norm(np.array([[3.0, 4.0], [1.0, 2.0]]))
+        array([25.,  5.])
+    """
+    squares: NDArray[Any] = np.add.reduce(np.square(rows), axis=1)  # as .sum(), without its overhead
+    return squares
 
 
 def place_on_ground(qpos: Array) -> dict[str, NDArray]:

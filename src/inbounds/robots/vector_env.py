@@ -137,7 +137,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         where = self._start(chosen)
         assert self._obs is not None
-        return self._obs.copy(), masked(where, chosen)
+        return self._obs.copy(), masked(only(chosen, where), chosen)
 
     def step(self, actions: Action) -> tuple[Array, Array, Flags, Flags, Info]:
         """Let every robot act once, and reset those whose episode ends.
@@ -174,7 +174,9 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         truncated = self._elapsed >= self.max_episode_steps
 
         self._obs = task.observe()
-        info = task.where() | dict(zip(("x_velocity", "y_velocity"), velocity.T, strict=False)) | terms
+        info = task.where() | {"x_velocity": velocity[:, 0]} | terms
+        if velocity.shape[1] > 1:
+            info["y_velocity"] = velocity[:, 1]
         over = terminated | truncated
         infos = self._restart(over, info) if over.any() else masked(info, self._everyone)
         return self._obs.copy(), reward, terminated, truncated, infos
@@ -276,7 +278,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         if actions.dtype not in (np.float32, np.float64):
             actions = actions.astype(np.float32)
         if self.action_mode == "clip":
-            actions = np.clip(actions, self._low, self._high)
+            actions = np.minimum(np.maximum(actions, self._low), self._high)  # np.clip, several times as fast
         if not np.isfinite(actions).all():
             bad = np.flatnonzero(~np.isfinite(actions).all(axis=1)).tolist()
             raise ValueError(
