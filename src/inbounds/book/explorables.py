@@ -86,7 +86,7 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
         sigma: Initial σ, in [0.05, e].
 
     Returns:
-        The explorable: curves, the Gaussian's mass at the bounds on an axis of its own, and a table of masses,
+        An explorable with the curves, the Gaussian's mass at the bounds on an axis of its own, and a table of masses,
         moments, medians and modes.
 
     Raises:

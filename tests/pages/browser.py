@@ -1,0 +1,110 @@
+"""A built book on a loopback server, and a headless Chromium to read it with.
+
+INBOUNDS_HTML names the folder of the built book (default `_build/html`), INBOUNDS_CHROMIUM the browser (default:
+Chromium or Chrome on PATH).
+"""
+
+import functools
+import http.server
+import os
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, sync_playwright
+
+HTML = Path(__file__).resolve().parents[2] / os.environ.get("INBOUNDS_HTML", "_build/html")
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    # Whatever a page asks of another host fails at once, and is seen to fail.
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+]
+DESKTOP = {"width": 1280, "height": 900}
+PHONE = {"width": 360, "height": 740}
+
+
+def find_chromium() -> str:
+    """Path of a Chromium; RuntimeError names the fix where there is none."""
+    if chosen := os.environ.get("INBOUNDS_CHROMIUM"):
+        if path := shutil.which(chosen):
+            return path
+        raise RuntimeError(
+            f"INBOUNDS_CHROMIUM={chosen} is not a program: give the path of Chromium or Chrome"
+        )
+    for name in NAMES:
+        if path := shutil.which(name):
+            return path
+    raise RuntimeError(
+        "no Chromium on PATH: apt install chromium, or set INBOUNDS_CHROMIUM to the path of yours"
+    )
+
+
+def pages(containing: str = "") -> list[str]:
+    """The book's pages, as paths below its folder, whose source contains a string."""
+    found = [path for path in HTML.rglob("*.html") if "_static" not in path.parts]
+    return sorted(
+        path.relative_to(HTML).as_posix()
+        for path in found
+        if path != HTML / "index.html" and containing in path.read_text(encoding="utf-8")
+    )
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    """Serves files without a line on stderr for each; whole files, so that a keep-alive connection is safe."""
+
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """Serve a folder on a free port of the loopback interface; gives the base address, ending in a slash."""
+    with http.server.ThreadingHTTPServer(
+        ("127.0.0.1", 0), functools.partial(_Quiet, directory=str(folder))
+    ) as server:
+        server.daemon_threads = True
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A headless Chromium."""
+    path = find_chromium()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGUMENTS)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def choose_theme(theme: str) -> str:
+    """A script that makes a page of pydata-sphinx-theme open light or dark, as if the reader had chosen so before."""
+    return f"localStorage.setItem('mode', '{theme}'); localStorage.setItem('theme', '{theme}');"
+
+
+# Resolves once the page has come to rest: fonts, MathJax, explorables.
+AT_REST = """async () => {
+  await document.fonts.ready;
+  if (window.MathJax?.startup) await MathJax.startup.promise;
+  const waiting = () => document.querySelector('.inbounds-explorable:is(:not([data-state]), [data-state=starting])');
+  for (let i = 0; i < 100 && waiting(); i++) await new Promise((done) => setTimeout(done, 100));
+}"""

@@ -1,0 +1,44 @@
+"""One server and one browser for every worker."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext
+
+from tests.pages import browser as book
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Everything in this folder needs the built book and a browser."""
+    for item in items:
+        if "tests/pages" in item.path.as_posix():
+            item.add_marker(pytest.mark.pages)
+
+
+@pytest.fixture(scope="session")
+def address() -> Iterator[str]:
+    """Where the built book is served, ending in a slash."""
+    if not (book.HTML / "index.html").exists():
+        pytest.fail(f"no built book in {book.HTML}: run `make book`, or set INBOUNDS_HTML", pytrace=False)
+    with book.served(book.HTML) as url:
+        yield url
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium."""
+    try:
+        book.find_chromium()
+    except RuntimeError as error:
+        pytest.fail(str(error), pytrace=False)
+    with book.chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    """A fresh reader: no cookies, no theme chosen."""
+    fresh = browser.new_context(viewport=book.DESKTOP)
+    fresh.set_default_timeout(20_000)
+    yield fresh
+    fresh.close()

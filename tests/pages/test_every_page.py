@@ -1,0 +1,163 @@
+"""What must hold on every page of the built book."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from urllib.parse import unquote, urldefrag, urljoin, urlsplit
+
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
+
+from tests.pages import browser as book
+
+PAGES = book.pages()
+LOCAL_SCHEMES = {"data", "blob", "about"}
+
+
+@dataclass
+class Visit:
+    """A page that was opened, and all that happened meanwhile."""
+
+    name: str
+    address: str
+    page: Page
+    requests: list[str] = field(default_factory=list)
+    bad_responses: list[str] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+
+    def on_request(self, request: Request) -> None:
+        self.requests.append(request.url)
+
+    def on_response(self, response: Response) -> None:
+        if response.status != 200:
+            self.bad_responses.append(f"{response.status} {response.url}")
+
+    def on_failure(self, request: Request) -> None:
+        self.bad_responses.append(f"{request.failure} {request.url}")
+
+    def on_console(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning", "assert"):
+            self.complaints.append(f"{message.type}: {message.text}")
+
+
+@pytest.fixture(scope="module", params=PAGES)
+def visit(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Visit]:
+    """The page, opened once and read by all tests of this file."""
+    context = browser.new_context(viewport=book.DESKTOP)
+    page = context.new_page()
+    visit = Visit(request.param, address, page)
+    page.on("request", visit.on_request)
+    page.on("response", visit.on_response)
+    page.on("requestfailed", visit.on_failure)
+    page.on("console", visit.on_console)
+    page.on("pageerror", lambda error: visit.complaints.append(f"exception: {error}"))
+    page.goto(address + request.param, wait_until="networkidle")
+    page.evaluate(book.AT_REST)
+    yield visit
+    context.close()
+
+
+def test_the_book_is_built() -> None:
+    assert PAGES, f"no pages in {book.HTML}: run `make book`, or set INBOUNDS_HTML"
+
+
+def test_the_first_page_leads_into_the_book(browser: Browser, address: str) -> None:
+    page = browser.new_page()
+    page.goto(address)
+    page.wait_for_selector("article h1")
+    assert page.url.removeprefix(address) in {*PAGES, "index.html", ""}
+    page.close()
+
+
+def test_nothing_is_asked_of_another_host(visit: Visit) -> None:
+    elsewhere = [
+        url
+        for url in visit.requests
+        if urlsplit(url).scheme not in LOCAL_SCHEMES and not url.startswith(visit.address)
+    ]
+    assert elsewhere == []
+
+
+def test_all_that_the_page_asks_for_is_there(visit: Visit) -> None:
+    assert visit.bad_responses == []
+    assert len(visit.requests) > 5  # the page, its styles, its scripts
+
+
+def test_console_is_clean(visit: Visit) -> None:
+    assert visit.complaints == []
+
+
+def test_mathematics_is_typeset(visit: Visit) -> None:
+    """Every formula became MathJax's output, without an error in it."""
+    assert visit.page.locator("mjx-merror, mjx-container [data-mjx-error]").all_text_contents() == []
+    raw = "nodes => nodes.filter((node) => !node.querySelector('mjx-container')).map((node) => node.textContent)"
+    assert visit.page.eval_on_selector_all("article .math", raw) == []
+
+
+def test_images_have_alt_text(visit: Visit) -> None:
+    """Words, not the file's name, which docutils puts where no alt text is given."""
+    images = visit.page.eval_on_selector_all(
+        "main img", "nodes => nodes.map((node) => [node.alt, node.src.slice(0, 80)])"
+    )
+    bad = [
+        (alt, src)
+        for alt, src in images
+        if len(alt.split()) < 3 or alt.endswith((".png", ".svg", ".jpg", ".jpeg"))
+    ]
+    assert bad == []
+
+
+def test_images_are_drawn(visit: Visit) -> None:
+    broken = """nodes => nodes.filter((node) => node.loading !== 'lazy' && !node.naturalWidth)
+                              .map((node) => node.src.slice(0, 80))"""
+    assert visit.page.eval_on_selector_all("main img", broken) == []
+
+
+def test_videos_wait_for_the_reader(visit: Visit) -> None:
+    wrong = """nodes => nodes.filter((v) => !v.controls || v.autoplay || v.loop || !v.getAttribute('aria-label'))
+                             .map((v) => v.outerHTML.slice(0, 120))"""
+    assert visit.page.eval_on_selector_all("video", wrong) == []
+
+
+@pytest.mark.parametrize("width", ["desktop", "phone"])
+def test_one_search_box(visit: Visit, width: str) -> None:
+    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
+    fields = visit.page.locator("input[type=search]:visible").count()
+    buttons = visit.page.locator(".search-button__button:visible").count()
+    if visit.name == "search.html":  # the page of results has its own field
+        assert fields == 1
+    else:
+        assert fields + buttons == 1
+
+
+def test_phone_does_not_scroll_sideways(visit: Visit) -> None:
+    visit.page.set_viewport_size(book.PHONE)
+    visit.page.evaluate(book.AT_REST)
+    too_wide = """() => {
+      const limit = document.documentElement.clientWidth;
+      const scrolls = (node) => node && (getComputedStyle(node).overflowX !== 'visible' || scrolls(node.parentElement));
+      return document.documentElement.scrollWidth <= limit ? [] :
+        [...document.querySelectorAll('main *')]
+          .filter((node) => node.getBoundingClientRect().right > limit + 1 && !scrolls(node.parentElement))
+          .map((node) => node.outerHTML.slice(0, 120)).concat(`${document.documentElement.scrollWidth} px`);
+    }"""
+    assert visit.page.evaluate(too_wide) == []
+
+
+def test_links_inside_the_book_lead_somewhere(visit: Visit) -> None:
+    """The file exists, and so does the place in it that the link names."""
+    targets = visit.page.eval_on_selector_all(
+        "a[href]", "nodes => nodes.map((node) => node.getAttribute('href'))"
+    )
+    dead = []
+    for target in sorted(set(targets)):
+        url, fragment = urldefrag(urljoin(visit.address + visit.name, target))
+        if not url.startswith(visit.address):
+            continue
+        path = book.HTML / unquote(urlsplit(url).path).lstrip("/")
+        if not path.is_file():
+            dead.append(target)
+        elif fragment and path.suffix == ".html":
+            text, anchor = path.read_text(encoding="utf-8"), unquote(fragment)
+            if f'id="{anchor}"' not in text and f'name="{anchor}"' not in text:
+                dead.append(target)
+    assert dead == []
