@@ -42,10 +42,10 @@ def choose_scripts(
     app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
     """Drop thebe's scripts from every page; add the explorables' scripts to the pages that need them."""
-    context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
     if EXPLORABLE in context.get("body", ""):
         for script in explorables.javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
+    context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
 
 
 SHIELDED: dict[str, list[str]] = {}
