@@ -25,9 +25,10 @@ from typing import Any, ClassVar, NamedTuple
 import torch
 from torch import Tensor
 from torch.distributions import Normal, constraints, kl_divergence, register_kl
-from torch.special import log_ndtr, ndtr, ndtri
+from torch.special import log_ndtr, ndtri
 
 from inbounds.distributions.bounds import BoundedDistribution, TensorLike, require_equal_bounds
+from inbounds.distributions.standard_normal import standard_normal_cdf, standard_normal_pdf
 
 __all__ = ["ClippedNormal", "gaussian_kl_upper_bound"]
 
@@ -119,7 +120,7 @@ class ClippedNormal(BoundedDistribution):
         """Return P(a ≤ value), `[...]`: it jumps by the mass of each bound, there included (right-continuous)."""
         if self._validate_args:
             self._validate_sample(value)
-        between = ndtr((value - self.loc) / self.scale)
+        between = standard_normal_cdf((value - self.loc) / self.scale)
         return torch.where(
             value < self.low,
             torch.zeros_like(between),
@@ -145,12 +146,12 @@ class ClippedNormal(BoundedDistribution):
     @property
     def mass_low(self) -> Tensor:
         """`[...]` P(a = low), a probability."""
-        return ndtr((self.low - self.loc) / self.scale)
+        return standard_normal_cdf((self.low - self.loc) / self.scale)
 
     @property
     def mass_high(self) -> Tensor:
         """`[...]` P(a = high), a probability."""
-        return ndtr((self.loc - self.high) / self.scale)
+        return standard_normal_cdf((self.loc - self.high) / self.scale)
 
     # ---- the centre and the spread
 
@@ -225,10 +226,10 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of(cls, lower: Tensor, upper: Tensor) -> _Parts:
-        at_lower, at_upper = (torch.exp(-t.square() / 2) / math.sqrt(2 * math.pi) for t in (lower, upper))
-        m0 = torch.where(
-            lower > 0, ndtr(-lower) - ndtr(-upper), ndtr(upper) - ndtr(lower)
-        )  # the smaller tails
+        at_lower, at_upper = standard_normal_pdf(lower), standard_normal_pdf(upper)
+        in_lower_half = standard_normal_cdf(upper) - standard_normal_cdf(lower)
+        in_upper_half = standard_normal_cdf(-lower) - standard_normal_cdf(-upper)
+        m0 = torch.where(lower > 0, in_upper_half, in_lower_half)  # the difference of the smaller tails
         m1 = at_lower - at_upper
         m2 = m0 + lower * at_lower - upper * at_upper
         return cls(lower, upper, log_ndtr(lower), log_ndtr(-upper), m0, m1, m2)

@@ -32,6 +32,7 @@ from torch.nn.functional import logsigmoid
 
 from inbounds.distributions.bounds import SigmoidMapped, TensorLike, require_equal_bounds
 from inbounds.distributions.quadrature import expectation, graded_trapezoid
+from inbounds.distributions.standard_normal import standard_normal_cdf
 
 __all__ = ["LogitNormal"]
 
@@ -134,7 +135,7 @@ class LogitNormal(SigmoidMapped):
         if self._validate_args:
             self._validate_sample(value)
         above_low, below_high, outside = self._distances(value)
-        inside = torch.special.ndtr((above_low.log() - below_high.log() - self.loc) / self.scale)
+        inside = standard_normal_cdf((above_low.log() - below_high.log() - self.loc) / self.scale)
         return torch.where(outside, (value >= self.high).to(inside.dtype), inside)
 
     def icdf(self, value: Tensor) -> Tensor:

@@ -28,6 +28,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from inbounds.distributions.standard_normal import standard_normal_pdf
+
 __all__ = ["Rule", "expectation", "gauss_hermite", "graded_trapezoid", "trapezoid"]
 
 
@@ -100,7 +102,7 @@ def trapezoid(
         )
     nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype, device=device)
     step = 2 * half_width / (num_nodes - 1)
-    weights = step * _standard_normal_density(nodes)
+    weights = step * standard_normal_pdf(nodes)
     weights[[0, -1]] /= 2
     return Rule(nodes, weights)
 
@@ -179,9 +181,5 @@ def graded_trapezoid(
     )  # [..., N]
     nodes = centre + torch.sinh(u) / rate
     step = (stop - start) / (num_nodes - 1)
-    weights = step * torch.cosh(u) / rate * _standard_normal_density(nodes)
+    weights = step * torch.cosh(u) / rate * standard_normal_pdf(nodes)
     return Rule(nodes, weights)
-
-
-def _standard_normal_density(x: Tensor) -> Tensor:
-    return torch.exp(-x.square() / 2) / math.sqrt(2 * math.pi)

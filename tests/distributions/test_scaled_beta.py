@@ -1,0 +1,226 @@
+"""The Beta on an interval against SciPy and mpmath, its KL in float32, its mode at the edges."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.special
+import scipy.stats
+import torch
+from hypothesis import given
+from torch.distributions import Beta, kl_divergence
+
+from inbounds.distributions import ScaledBeta
+
+from .families import double, few, floats, intervals
+
+log_concentrations = floats(-2, 4.4)  # up to 80, where the source thesis caps them
+
+
+def pair(log_alpha: float, log_beta: float) -> tuple[float, float]:
+    return math.exp(log_alpha), math.exp(log_beta)
+
+
+@few
+@given(log_concentrations, log_concentrations, intervals(), floats(0.001, 0.999))
+def test_density_and_moments_are_scipys(
+    log_alpha: float, log_beta: float, bounds: tuple[float, float], fraction: float
+) -> None:
+    (alpha, beta), (low, high) = pair(log_alpha, log_beta), bounds
+    ours = ScaledBeta(*double(alpha, beta), low, high)
+    scipys = scipy.stats.beta(alpha, beta, low, high - low)
+    value = low + fraction * (high - low)
+    assert float(ours.log_prob(*double(value))) == pytest.approx(scipys.logpdf(value), rel=1e-8, abs=1e-8)
+    assert float(ours.mean) == pytest.approx(scipys.mean(), rel=1e-12)
+    assert float(ours.variance) == pytest.approx(scipys.var(), rel=1e-12)
+    assert float(ours.entropy()) == pytest.approx(scipys.entropy(), rel=1e-8, abs=1e-9)
+
+
+def test_the_normaliser_is_the_gamma_function_of_the_sum() -> None:
+    """Fact: Γ(α + β) normalises the density. With the incomplete gamma Γ(α, β), as printed, it does not."""
+    alpha, beta = 2.5, 1.5
+    ours = ScaledBeta(*double(alpha, beta), -1.0, 2.0)
+    integral = scipy.integrate.quad(lambda a: float(ours.log_prob(*double(a)).exp()), -1, 2)[0]
+    assert integral == pytest.approx(1.0, abs=1e-7)
+    incomplete = scipy.special.gammaincc(alpha, beta) * scipy.special.gamma(alpha)
+    assert integral * incomplete / scipy.special.gamma(alpha + beta) < 0.5
+
+
+@few
+@given(log_concentrations, log_concentrations, intervals(), floats(-6, 6))
+def test_latent_density_is_the_density(
+    log_alpha: float, log_beta: float, bounds: tuple[float, float], latent: float
+) -> None:
+    ours, (z,) = ScaledBeta(*double(*pair(log_alpha, log_beta)), *bounds), double(latent)
+    expected = ours.log_prob(ours.latent_to_value(z))
+    torch.testing.assert_close(ours.log_prob_latent(z), expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("latent", [-40.0, 40.0])
+@pytest.mark.parametrize(("alpha", "beta"), [(0.5, 3.0), (1.0, 1.0), (80.0, 2.0)])
+def test_finite_at_saturated_latents(dtype: torch.dtype, latent: float, alpha: float, beta: float) -> None:
+    a = torch.tensor(alpha, dtype=dtype, requires_grad=True)
+    b = torch.tensor(beta, dtype=dtype, requires_grad=True)
+    z = torch.tensor(latent, dtype=dtype, requires_grad=True)
+    log_prob = ScaledBeta(a, b, -2.0, 3.0).log_prob_latent(z)
+    assert log_prob.dtype == dtype
+    gradients = torch.autograd.grad(log_prob, (a, b, z))
+    with mpmath.workdps(60):
+        x = 1 / (1 + mpmath.exp(-mpmath.mpf(latent)))
+        exact = (alpha - 1) * mpmath.log(x) + (beta - 1) * mpmath.log(1 - x)
+        exact -= mpmath.log(mpmath.beta(alpha, beta) * 5)
+        slopes = [
+            mpmath.log(x) - mpmath.digamma(alpha) + mpmath.digamma(alpha + beta),
+            mpmath.log(1 - x) - mpmath.digamma(beta) + mpmath.digamma(alpha + beta),
+            (alpha - 1) * (1 - x) - (beta - 1) * x,
+        ]
+    accuracy = 1e-6 if dtype == torch.float32 else 1e-12
+    for ours, truth in zip((log_prob, *gradients), (exact, *slopes), strict=True):
+        assert ours.item() == pytest.approx(float(truth), rel=accuracy, abs=accuracy)
+
+
+def exact_kl(p: tuple[float, float], q: tuple[float, float]) -> float:
+    with mpmath.workdps(50):
+        (a, b), (c, d) = ([mpmath.mpf(x) for x in xs] for xs in (p, q))
+        divergence = mpmath.log(mpmath.beta(c, d) / mpmath.beta(a, b))
+        divergence += (a - c) * mpmath.digamma(a) + (b - d) * mpmath.digamma(b)
+        return float(divergence + (c - a + d - b) * mpmath.digamma(a + b))
+
+
+@few
+@given(log_concentrations, log_concentrations, log_concentrations, log_concentrations)
+def test_kl_is_torchs_and_mpmaths(a: float, b: float, c: float, d: float) -> None:
+    p, q = pair(a, b), pair(c, d)
+    divergence = kl_divergence(ScaledBeta(*double(*p), -3.0, 1.0), ScaledBeta(*double(*q), -3.0, 1.0))
+    torch.testing.assert_close(
+        divergence, kl_divergence(Beta(*double(*p)), Beta(*double(*q))), atol=1e-11, rtol=1e-9
+    )
+    assert float(divergence) == pytest.approx(exact_kl(p, q), rel=1e-10, abs=1e-11)
+
+
+def test_kl_is_the_integral_of_the_log_ratio() -> None:
+    """Fact: the closed form is KL(P‖Q) with P first, and does not feel the interval."""
+    p, q = ScaledBeta(*double(2.0, 5.0), -1.0, 4.0), ScaledBeta(*double(3.0, 1.5), -1.0, 4.0)
+
+    def integrand(a: float) -> float:
+        (value,) = double(a)
+        return float(p.log_prob(value).exp() * (p.log_prob(value) - q.log_prob(value)))
+
+    integral = scipy.integrate.quad(integrand, -1, 4)[0]
+    assert float(kl_divergence(p, q)) == pytest.approx(integral, abs=1e-7)
+    assert float(kl_divergence(q, p)) != pytest.approx(integral, rel=1e-2)
+
+
+def test_the_float32_kl_can_be_trusted() -> None:
+    """Fact: in float32 arithmetic the closed form drowns in its terms; through float64 it keeps all its digits."""
+    p, q = (79.5, 60.25), (79.75, 60.375)
+    exact = exact_kl(p, q)
+    assert 0 < exact < 1e-3
+    ours = kl_divergence(ScaledBeta(*map(torch.tensor, p)), ScaledBeta(*map(torch.tensor, q)))
+    assert ours.dtype == torch.float32
+    assert ours.item() == pytest.approx(exact, rel=1e-6)
+    torchs = kl_divergence(Beta(*map(torch.tensor, p)), Beta(*map(torch.tensor, q)))
+    assert abs(torchs.item() - exact) > exact / 5
+
+
+def test_fisher_is_the_hessian_of_the_kl() -> None:
+    """At home the KL's Hessian is the trigamma matrix: the Beta policy does TRPO like any other."""
+    parameters = torch.tensor([2.5, 4.0], dtype=torch.float64)
+    home = ScaledBeta(*parameters)
+    hessian = torch.autograd.functional.hessian(
+        lambda t: kl_divergence(home, ScaledBeta(t[0], t[1])), parameters
+    )
+    both = scipy.special.polygamma(1, 6.5)
+    expected = np.diag(scipy.special.polygamma(1, [2.5, 4.0])) - both
+    np.testing.assert_allclose(hessian.numpy(), expected, rtol=1e-8)  # torch's trigamma is good to 1e-9
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta", "mode"),
+    [
+        (3.0, 2.0, 2 / 3),
+        (1.0, 3.0, 0.0),
+        (3.0, 1.0, 1.0),
+        (1.0, 1.0, 0.5),
+        (0.5, 3.0, 0.0),
+        (0.5, 1.0, 0.0),
+        (3.0, 0.5, 1.0),
+        (0.4, 0.6, 0.0),
+        (0.6, 0.4, 1.0),
+        (0.5, 0.5, 1.0),
+    ],
+)
+def test_mode_and_its_edges(alpha: float, beta: float, mode: float) -> None:
+    ours = ScaledBeta(*double(alpha, beta), -1.0, 3.0)
+    assert float(ours.mode) == pytest.approx(-1 + 4 * mode, abs=1e-15)
+    probes = torch.linspace(-0.9999, 2.9999, 999, dtype=torch.float64)
+    highest = ours.log_prob((ours.mode + 0).clamp(-0.99999, 2.99999))
+    assert bool((highest >= ours.log_prob(probes) - 1e-9).all())
+
+
+def test_mode_gradients_are_finite_at_the_edges() -> None:
+    alpha = torch.tensor([1.0, 0.5, 2.0, 1.0], dtype=torch.float64, requires_grad=True)
+    beta = torch.tensor([1.0, 0.5, 3.0, 2.0], dtype=torch.float64, requires_grad=True)
+    gradients = torch.autograd.grad(ScaledBeta(alpha, beta).mode.sum(), (alpha, beta))
+    assert all(bool(g.isfinite().all()) for g in gradients)
+    assert float(gradients[0][2]) == pytest.approx(2 / 9)  # (β − 1)/(α + β − 2)²
+
+
+@few
+@given(intervals(), floats(0, 1), floats(0, 200))
+def test_from_mode(bounds: tuple[float, float], fraction: float, concentration: float) -> None:
+    """α = 1 + ωκ, β = 1 + (1 − ω)κ: the mode comes back, and a larger κ is a narrower law."""
+    low, high = bounds
+    mode = double(low + fraction * (high - low))[0].clamp(low, high)
+    ours = ScaledBeta.from_mode(mode, concentration, low, high)
+    omega = (mode - low) / (high - low)
+    torch.testing.assert_close(ours.concentration1, 1 + omega * concentration)
+    torch.testing.assert_close(ours.concentration0, 1 + (1 - omega) * concentration)
+    if concentration > 1e-3:
+        torch.testing.assert_close(ours.mode, mode, rtol=1e-9, atol=1e-9)
+    narrower = ScaledBeta.from_mode(mode, concentration + 5, low, high)
+    assert narrower.stddev < ours.stddev
+
+
+def test_from_mode_refuses_what_is_no_mode() -> None:
+    with pytest.raises(ValueError, match="the mode must lie within"):
+        ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0)
+    with pytest.raises(ValueError, match="must not be negative"):
+        ScaledBeta.from_mode(0.5, torch.tensor([1.0, -2.0]), -1.0, 1.0)
+    with pytest.raises(ValueError, match="low must be less than high"):
+        ScaledBeta.from_mode(1.0, 2.0, 1.0, 1.0)
+    assert ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0, validate_args=False).concentration0 == 0.5
+
+
+def test_from_mode_differentiates() -> None:
+    mode, concentration = (t.requires_grad_() for t in double([0.3, -0.5], [4.0, 0.5]))
+
+    def concentrations(m: torch.Tensor, k: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        law = ScaledBeta.from_mode(m, k, -1.0, 1.0)
+        return law.concentration1, law.concentration0
+
+    assert torch.autograd.gradcheck(concentrations, (mode, concentration))
+
+
+def test_tiny_concentrations_sample_both_bounds_and_stay_finite() -> None:
+    """Where a Gamma variable underflows its logarithm does not: the latents of Beta(0.01, 0.01) are finite."""
+    ours = ScaledBeta(torch.tensor(0.01), 0.01, -1.0, 1.0)
+    generator = torch.Generator().manual_seed(0)
+    latent = ours.rsample_latent((2000,), generator)
+    assert bool(latent.isfinite().all())
+    assert latent.abs().max() > 200
+    assert bool(ours.log_prob(ours.latent_to_value(latent)).isfinite().all())
+    assert bool(ours.log_prob_latent(latent).isfinite().all())
+    assert latent.gt(0).float().mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_latents_have_the_laws_moments() -> None:
+    """E[z] = ψ(α) − ψ(β) and Var[z] = ψ'(α) + ψ'(β)."""
+    latent = ScaledBeta(*double(0.3, 2.0)).rsample_latent((20000,), torch.Generator().manual_seed(1))
+    mean = scipy.special.digamma(0.3) - scipy.special.digamma(2.0)
+    variance = scipy.special.polygamma(1, 0.3) + scipy.special.polygamma(1, 2.0)
+    assert float(latent.mean()) == pytest.approx(mean, abs=4 * math.sqrt(variance / 20000))
+    assert float(latent.var()) == pytest.approx(variance, rel=0.06)
