@@ -4,12 +4,16 @@ The oracle is a ``SyncVectorEnv`` of Gymnasium's v5 environments that resets in 
 everything that ``reset`` and ``step`` return, info included, with types and masks.
 """
 
+import itertools
+
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
+from gymnasium.envs.mujoco.humanoid_v5 import mass_center
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from inbounds.robots import TASKS, make
+from inbounds.robots import TASKS, RobotVectorEnv, make
 
 FALLS = {"Hopper-v5", "Walker2d-v5", "Ant-v5", "Humanoid-v5"}
 
@@ -93,6 +97,77 @@ def test_actions_in_double_precision(name, action_mode):
 @pytest.mark.parametrize("name", TASKS)
 def test_four_robots_for_two_episodes(name, action_mode):
     run_beside(name, action_mode, num_envs=4, steps=2100)
+
+
+def put(single: gymnasium.Env, robots: RobotVectorEnv, height: float, lean: float, speed: float) -> None:
+    """Bring Gymnasium's robot, and the only one of the batch, into the same unusual state."""
+    inner = single.unwrapped
+    qpos, qvel = inner.init_qpos.copy(), np.full(inner.model.nv, speed)
+    qpos[robots.task.hidden] = (
+        height  # z, but the front link's heading for Swimmer and Half Cheetah's z offset
+    )
+    if robots.task.hidden == 1:
+        qpos[2] = lean
+    inner.set_state(qpos, qvel)
+    state = robots.get_state()
+    mujoco.mj_getState(inner.model, inner.data, state["physics"][0], mujoco.mjtState.mjSTATE_INTEGRATION)
+    place = {"Ant-v5": inner.data.xpos[1], "Humanoid-v5": mass_center(inner.model, inner.data)}
+    state["position"][0] = place.get(robots.name, inner.data.qpos)[: robots.task.hidden]
+    robots.set_state(state)
+
+
+HEIGHTS = (0.1, 0.21, 0.69, 0.71, 0.79, 0.81, 0.99, 1.01, 1.99, 2.01)
+LEANS = (0.0, -0.19, 0.21, -0.99, 1.01)
+SPEEDS = (0.0, 12.0, -150.0)  # beyond what is observed, beyond what is healthy
+
+
+@pytest.mark.filterwarnings(
+    "ignore::inbounds.robots.MujocoWarning"
+)  # some go unstable: both reset them alike
+@pytest.mark.parametrize("name", TASKS)
+def test_unusual_states(name):
+    """High, low, leaning and fast robots: the limits of health and of what is observed."""
+    single, robots = gymnasium.make(name), make(name, 1)
+    single.reset(seed=0)
+    robots.reset(seed=0)
+    action = np.zeros(single.action_space.shape, np.float32)
+    healthy = 0
+    for height, lean, speed in itertools.product(HEIGHTS, LEANS, SPEEDS):
+        put(single, robots, height, lean, speed)
+        expected, actual = single.step(action), robots.step(action[None])
+        where = f"height {height}, lean {lean}, speed {speed}"
+        info = actual[4].get("final_info", actual[4])
+        obs = actual[4]["final_obs"] if actual[2][0] else actual[0]
+        np.testing.assert_array_equal(obs[0], expected[0], err_msg=where)
+        assert (actual[1][0], actual[2][0]) == expected[1:3], where
+        for key, value in expected[4].items():
+            np.testing.assert_array_equal(info[key][0], value, err_msg=where)
+        healthy += not expected[2]
+    assert 0 < healthy < 150 or name not in FALLS
+
+
+LIMITS = [0.2, 0.7, 0.8, 1.0, 2.0, 100.0]
+EDGES = [
+    edge for x in LIMITS for y in (x, -x) for edge in (np.nextafter(y, -np.inf), y, np.nextafter(y, np.inf))
+]
+
+
+@pytest.mark.parametrize("name", sorted(FALLS))
+def test_health_at_its_limits(name):
+    single, robots = gymnasium.make(name).unwrapped, make(name, 1)
+    health = set()
+    for value in [*EDGES, 0.0, 1.3, np.nan, np.inf, -np.inf]:
+        for index in range(single.model.nq + single.model.nv):
+            state = np.concatenate((single.init_qpos, single.init_qvel))
+            state[index] = value
+            for qpos, qvel in (
+                (robots.task.qpos[0], robots.task.qvel[0]),
+                (single.data.qpos, single.data.qvel),
+            ):
+                qpos[:], qvel[:] = np.split(state, [single.model.nq])
+            assert robots.task.is_healthy()[0] == single.is_healthy, f"{value} at {index}"
+            health.add(bool(single.is_healthy))
+    assert health == {True, False}
 
 
 def test_one_robot_against_a_plain_environment():

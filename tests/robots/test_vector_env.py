@@ -100,6 +100,7 @@ def test_what_is_returned_is_the_callers_own():
         kept = [array.copy() for array in expected[:4]]
         for array in returned[:4]:
             array[:] = 1
+        np.testing.assert_array_equal(envs.get_state()["obs"], expected[0])
         for key, values in returned[4].items():
             if not key.startswith("_") and isinstance(values, np.ndarray):
                 values[:] = 0

@@ -41,7 +41,5 @@ def _handle(message: str) -> None:
         return
     try:
         warnings.warn(message.strip(), MujocoWarning, stacklevel=2)
-    except (
-        Warning
-    ) as error:  # an exception that left this function would end the process: C++ cannot catch it
+    except Warning as error:  # it must not leave this function: C++ cannot catch it and would end the process
         _pending.append(error)

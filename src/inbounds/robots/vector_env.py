@@ -69,7 +69,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         num_threads: int = 1,
         render_mode: str | None = None,
     ) -> None:
-        _check_arguments(name, num_envs, action_mode, max_episode_steps, num_threads, render_mode)
+        counts = {"num_envs": num_envs, "max_episode_steps": max_episode_steps, "num_threads": num_threads}
+        _check_arguments(name, action_mode, render_mode, counts)
         self.name = name
         self.num_envs = num_envs
         self.action_mode = action_mode
@@ -84,9 +85,9 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         self.dt = self.task.dt  # of one step [s]
         self._make_spaces()
 
-        self._generators, self._seeds = map(
-            list, zip(*(seeding.np_random() for _ in range(num_envs)), strict=True)
-        )
+        generators = [seeding.np_random() for _ in range(num_envs)]
+        self._generators = [generator for generator, _ in generators]
+        self._seeds = [seed for _, seed in generators]
         self._elapsed = np.zeros(num_envs, np.int64)  # steps since the last reset
         self._position = self.task.position()  # at the end of the last step
         self._obs: Array | None = None  # the last one returned; None before the first reset
@@ -319,31 +320,19 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             "final_info": final_info,
             "_final_info": over,
         }
-        ended = {
-            key: values for key, values in info.items() if key not in where
-        }  # not known of a new episode
-        infos |= masked(where, self._everyone) | masked(only(~over, ended), ~over)
+        # What is said of a step is not known of robots that have just been reset.
+        of_step = {key: values for key, values in info.items() if key not in where}
+        infos |= masked(where, self._everyone) | masked(only(~over, of_step), ~over)
         return infos
 
 
-def _check_arguments(
-    name: str,
-    num_envs: int,
-    action_mode: str,
-    max_episode_steps: int,
-    num_threads: int,
-    render_mode: str | None,
-) -> None:
+def _check_arguments(name: str, action_mode: str, render_mode: str | None, counts: dict[str, int]) -> None:
     if name not in TASKS:
         raise ValueError(f"There is no task {name!r}; there are {', '.join(TASKS)}")
     if action_mode not in ("clip", "raw"):
         raise ValueError(f"action_mode must be 'clip' or 'raw', got {action_mode!r}")
     if render_mode not in (None, "rgb_array"):
         raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
-    for what, count in (
-        ("num_envs", num_envs),
-        ("max_episode_steps", max_episode_steps),
-        ("num_threads", num_threads),
-    ):
+    for argument, count in counts.items():
         if count < 1:
-            raise ValueError(f"{what} must be at least 1, got {count}")
+            raise ValueError(f"{argument} must be at least 1, got {count}")
