@@ -42,6 +42,7 @@ def choose_scripts(
     app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
     """Drop thebe's scripts from every page; add the explorables' scripts to the pages that need them."""
+    context["default_mode"] = "auto"  # follow the system; the theme logs an error where this is empty
     if EXPLORABLE in context.get("body", ""):
         for script in explorables.javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
