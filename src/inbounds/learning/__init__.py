@@ -1,0 +1,43 @@
+"""How the policy changes: families, networks, rollouts, REINFORCE, PPO and TRPO over seeds in lockstep."""
+
+from inbounds.learning.actor_critic import ActorCritic, NetworkConfig
+from inbounds.learning.advantages import gae, normalize_advantage
+from inbounds.learning.config import TrainConfig, preset
+from inbounds.learning.initial_noise import executed_std
+from inbounds.learning.laws import Limits, Parameters
+from inbounds.learning.networks import Mlp, SeedLinear, mlp
+from inbounds.learning.normalize import RunningNormalizer
+from inbounds.learning.policies import FAMILIES, Family, Policy, PolicyConfig
+from inbounds.learning.policy_gradient import PolicyGradientConfig
+from inbounds.learning.ppo import PPOConfig
+from inbounds.learning.rollout import Collector, Rollout
+from inbounds.learning.training import DivergedSeedWarning, Trainer, train
+from inbounds.learning.trpo import TRPOConfig
+
+__all__ = [
+    "FAMILIES",
+    "ActorCritic",
+    "Collector",
+    "DivergedSeedWarning",
+    "Family",
+    "Limits",
+    "Mlp",
+    "NetworkConfig",
+    "PPOConfig",
+    "Parameters",
+    "Policy",
+    "PolicyConfig",
+    "PolicyGradientConfig",
+    "Rollout",
+    "RunningNormalizer",
+    "SeedLinear",
+    "TRPOConfig",
+    "TrainConfig",
+    "Trainer",
+    "executed_std",
+    "gae",
+    "mlp",
+    "normalize_advantage",
+    "preset",
+    "train",
+]

@@ -1,0 +1,61 @@
+"""The checks that the configurations share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+def check(
+    config: Any,
+    *,
+    positive: Sequence[str] = (),
+    not_negative: Sequence[str] = (),
+    unit: Sequence[str] = (),
+    positive_or_none: Sequence[str] = (),
+) -> None:
+    """Raise a ValueError that names the first field out of range.
+
+    Args:
+        config: a dataclass.
+        positive: names of fields that must be > 0.
+        not_negative: of fields that must be ≥ 0.
+        unit: of fields that must lie in [0, 1].
+        positive_or_none: of fields that must be > 0, or None.
+
+    Example:
+        >>> from types import SimpleNamespace
+        >>> check(SimpleNamespace(gamma=1.5), unit=["gamma"])
+        Traceback (most recent call last):
+        ValueError: gamma must lie in [0, 1], got 1.5
+    """
+    rules = (
+        (positive, "be positive", lambda x: x > 0),
+        (not_negative, "not be negative", lambda x: x >= 0),
+        (unit, "lie in [0, 1]", lambda x: 0 <= x <= 1),
+        (positive_or_none, "be positive, or None", lambda x: x is None or x > 0),
+    )
+    for names, rule, holds in rules:
+        for name in names:
+            value = getattr(config, name)
+            if not holds(value):
+                raise ValueError(f"{name} must {rule}, got {value}")
+
+
+def check_minibatches(horizon: int, minibatch_size: int) -> None:
+    """Raise a ValueError unless minibatches divide the rollout without a rest.
+
+    Args:
+        horizon: T.
+        minibatch_size: B.
+
+    Example:
+        >>> check_minibatches(100, 64)
+        Traceback (most recent call last):
+        ValueError: minibatch_size must divide horizon, but 100 = 1 × 64 + 36
+    """
+    quotient, rest = divmod(horizon, minibatch_size)
+    if rest:
+        raise ValueError(
+            f"minibatch_size must divide horizon, but {horizon} = {quotient} × {minibatch_size} + {rest}"
+        )

@@ -1,0 +1,124 @@
+"""The whole description of a run, and the two presets."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Literal, TypeAlias
+
+from inbounds.learning import policy_gradient, ppo, trpo
+from inbounds.learning.actor_critic import NetworkConfig
+from inbounds.learning.checks import check
+from inbounds.learning.policies import PolicyConfig
+from inbounds.learning.policy_gradient import PolicyGradientConfig
+from inbounds.learning.ppo import PPOConfig
+from inbounds.learning.trpo import TRPOConfig
+
+AlgorithmConfig: TypeAlias = PPOConfig | TRPOConfig | PolicyGradientConfig
+
+ALGORITHMS: dict[str, tuple[type[AlgorithmConfig], ModuleType]] = {
+    "ppo": (PPOConfig, ppo),
+    "trpo": (TRPOConfig, trpo),
+    "policy-gradient": (PolicyGradientConfig, policy_gradient),
+}
+"""By name: the configuration, and the module with `make_optimizer` and `update`."""
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """Everything that decides what a run does. Two runs with one configuration are the same run, bit for bit."""
+
+    env: str = "HalfCheetah-v5"
+    """One of the robots of `inbounds.robots`, or any id that `gymnasium.make` knows."""
+    seeds: tuple[int, ...] = tuple(range(10))
+    """Trained in lockstep; none notices the others."""
+    epochs: int = 500
+    """Rollouts, each followed by one update."""
+    algorithm: AlgorithmConfig = field(default_factory=PPOConfig)
+    """PPO, TRPO or REINFORCE with a baseline, with all its numbers."""
+    policy: PolicyConfig = field(default_factory=PolicyConfig)
+    """The family and how network outputs become its parameters."""
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    """Shape, first weights and precision."""
+    normalize_obs: bool = True
+    """Normalise observations by running statistics, per seed."""
+    action_mode: Literal["clip", "raw"] = "clip"
+    """clip: to the box, before robot and reward see the action. raw: as it was drawn."""
+    checkpoint_every: int = 10
+    """Epochs between checkpoints, where a run directory is given; the last epoch always has one."""
+
+    def __post_init__(self) -> None:
+        check(self, positive=("epochs", "checkpoint_every"))
+        if not self.seeds or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
+            raise ValueError(
+                f"seeds must be different, non-negative integers, at least one; got {self.seeds}"
+            )
+        if self.action_mode not in ("clip", "raw"):
+            raise ValueError(f"action_mode must be clip or raw, got {self.action_mode!r}")
+
+    @property
+    def algorithm_name(self) -> str:
+        """ppo, trpo or policy-gradient."""
+        return next(name for name, (kind, _) in ALGORITHMS.items() if isinstance(self.algorithm, kind))
+
+
+def preset(
+    name: Literal["common", "as-printed"],
+    env: str = "HalfCheetah-v5",
+    *,
+    policy: str = "logit-normal",
+    algo: str = "ppo",
+    seeds: int | Sequence[int] = 10,
+    epochs: int = 500,
+) -> TrainConfig:
+    """Return a configuration with every number explicit.
+
+    `common` is what public implementations have settled on (Engstrom et al. 2020; Andrychowicz et al. 2021; Huang et
+    al. 2022). `as-printed` is the source thesis' tables to the letter, PPO's ε = 0.02 included, and no practice that it
+    does not mention. What neither states (conjugate gradients, damping, line search) is the same in both.
+
+    Args:
+        name: "common" or "as-printed".
+        env: id of the environment.
+        policy: gaussian, clipped-gaussian, beta or logit-normal.
+        algo: ppo, trpo or policy-gradient.
+        seeds: how many (0, 1, …), or which.
+        epochs: rollouts, each followed by one update.
+
+    Returns:
+        The configuration; change it with `dataclasses.replace`.
+
+    Raises:
+        ValueError: no preset, algorithm or family of that name.
+
+    Example:
+        >>> config = preset("as-printed", "Hopper-v5", policy="beta", seeds=3)
+        >>> config.algorithm.clip_range, config.network.initialization, config.seeds
+        (0.02, 'pytorch', (0, 1, 2))
+    """
+    if algo not in ALGORITHMS:
+        raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
+    common = TrainConfig(
+        env=env,
+        seeds=tuple(range(seeds)) if isinstance(seeds, int) else tuple(seeds),
+        epochs=epochs,
+        algorithm=ALGORITHMS[algo][0](),
+        policy=PolicyConfig(policy),
+    )
+    if name == "common":
+        return common
+    if name != "as-printed":
+        raise ValueError(f"no preset {name!r}; choose common or as-printed")
+    algorithm = dataclasses.replace(
+        common.algorithm, adam_eps=1e-8, normalize_advantage=False, max_grad_norm=None
+    )
+    if isinstance(algorithm, PPOConfig):
+        algorithm = dataclasses.replace(algorithm, clip_range=0.02)
+    return dataclasses.replace(
+        common,
+        algorithm=algorithm,
+        network=NetworkConfig(initialization="pytorch"),
+        normalize_obs=False,
+    )

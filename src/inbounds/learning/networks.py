@@ -1,0 +1,178 @@
+r"""Ten networks as one: multi-layer perceptrons with a seed axis.
+
+A `SeedLinear` holds S affine maps and applies them side by side, one batched matrix product for all seeds:
+
+$$ h_{s} = W_s x_s + b_s,   W: [S, out, in],  x: [S, in, B]. $$
+
+Activations are *feature-major*, the batch last: a head of a few outputs is then a short matrix, not a thin one,
+which matrix libraries dislike. An `Mlp` keeps all its weights in one matrix `theta [S, P]`, a row per seed, of which
+the layers are views: an optimiser steps on one tensor, and a seed's gradient is a row.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+
+class _Tanh(torch.autograd.Function):
+    """tanh by NumPy, on one core several times as fast as torch's; differentiable to any order."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor) -> Tensor:
+        y = torch.from_numpy(np.tanh(x.detach().numpy()))
+        ctx.save_for_backward(y)
+        return y
+
+    @staticmethod
+    def backward(ctx: Any, *grads: Tensor) -> Tensor:
+        (y,) = ctx.saved_tensors
+        return torch.ops.aten.tanh_backward(grads[0], y)
+
+
+def tanh(x: Tensor) -> Tensor:
+    """Return the hyperbolic tangent of x, `[...]`.
+
+    Example:
+        >>> x = torch.tensor([0.5], requires_grad=True)
+        >>> (slope,) = torch.autograd.grad(tanh(x), x)
+        >>> round(slope.item(), 4)  # 1 − tanh²(½)
+        0.7864
+    """
+    y: Tensor = _Tanh.apply(x)
+    return y
+
+
+@dataclass
+class SeedLinear:
+    """S affine maps side by side.
+
+    Args:
+        weight: `[S, out, in]`.
+        bias: `[S, out, 1]`.
+
+    Example:
+        >>> layer = SeedLinear(weight=torch.ones(2, 1, 3), bias=torch.tensor([[[0.0]], [[10.0]]]))
+        >>> layer(torch.ones(2, 3, 5))[:, 0, 0].tolist()  # two seeds, a batch of five
+        [3.0, 13.0]
+    """
+
+    weight: Tensor
+    bias: Tensor
+
+    def __call__(self, x: Tensor) -> Tensor:
+        """Return W x + b, `[S, out, B]`, for x `[S, in, B]`."""
+        return torch.baddbmm(self.bias, self.weight, x)
+
+
+def mlp(layers: Sequence[SeedLinear], obs: Tensor) -> Tensor:
+    """Return the outputs `[S, B, out]` for observations `[S, B, O]`: tanh between the layers, none after the last."""
+    h = obs.mT  # [S, O, B]
+    for layer in layers[:-1]:
+        h = tanh(layer(h))
+    return layers[-1](h).mT
+
+
+class Mlp:
+    """The weights of S perceptrons of one shape.
+
+    Args:
+        num_seeds: S.
+        sizes: of the layers, inputs first: (O, 64, 64, outputs).
+        dtype: of the weights, torch.float32 or torch.float64.
+
+    Example:
+        >>> net = Mlp(num_seeds=10, sizes=(17, 64, 64, 12))
+        >>> net.theta.shape, net(torch.zeros(10, 5, 17)).shape
+        (torch.Size([10, 6092]), torch.Size([10, 5, 12]))
+    """
+
+    def __init__(self, num_seeds: int, sizes: Sequence[int], dtype: torch.dtype = torch.float32) -> None:
+        self.sizes = tuple(sizes)
+        shapes = [
+            shape for n_in, n_out in itertools.pairwise(self.sizes) for shape in ((n_out, n_in), (n_out, 1))
+        ]
+        self._lengths = [rows * columns for rows, columns in shapes]
+        self.theta = torch.zeros(num_seeds, sum(self._lengths), dtype=dtype)
+        self.theta.grad = torch.zeros_like(self.theta)
+        self.parameters = [
+            part.unflatten(1, shape).detach().requires_grad_()
+            for part, shape in zip(self.theta.split(self._lengths, 1), shapes, strict=True)
+        ]
+        self._gradients = [
+            part.unflatten(1, shape)
+            for part, shape in zip(self.theta.grad.split(self._lengths, 1), shapes, strict=True)
+        ]
+        self.layers = [SeedLinear(*pair) for pair in zip(*[iter(self.parameters)] * 2, strict=True)]
+        self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
+
+    def __call__(self, obs: Tensor) -> Tensor:
+        """Return the outputs `[S, B, out]` for observations `[S, B, O]`."""
+        return mlp(self.layers, obs)
+
+    def act(self, obs: NDArray[Any]) -> NDArray[Any]:
+        """Return the outputs `[S, out]` for one observation per seed `[S, O]`, in plain NumPy and without a graph."""
+        h = obs[:, :, None]  # [S, O, 1]
+        for weight, bias in self._arrays[:-1]:
+            h = weight @ h
+            h += bias
+            np.tanh(h, out=h)
+        weight, bias = self._arrays[-1]
+        return (weight @ h + bias)[:, :, 0]
+
+    def store_gradients(self, gradients: Sequence[Tensor]) -> None:
+        """Write gradients, one per parameter in order, into `theta.grad`, where the optimiser reads them."""
+        for target, gradient in zip(self._gradients, gradients, strict=True):
+            target.copy_(gradient)
+
+    def named_tensors(self, prefix: str) -> dict[str, Tensor]:
+        """Return copies `[S, out, in]` and `[S, out]` under names like `policy.0.weight`, for export."""
+        return {
+            f"{prefix}.{i}.{name}": tensor.detach().clone().contiguous()
+            for i, layer in enumerate(self.layers)
+            for name, tensor in (("weight", layer.weight), ("bias", layer.bias[:, :, 0]))
+        }
+
+
+def flatten(tensors: Sequence[Tensor]) -> Tensor:
+    """Return one row `[S, P]` per seed of what is shaped like the parameters of an `Mlp`."""
+    return torch.cat([tensor.flatten(1) for tensor in tensors], 1)
+
+
+@torch.no_grad()
+def initialize_pytorch(net: Mlp, generators: Sequence[torch.Generator]) -> None:
+    """Draw weights and biases uniformly on ±1/√in, as `torch.nn.Linear` does, each seed from its own generator."""
+    for s, generator in enumerate(generators):
+        for layer in net.layers:
+            bound = 1 / math.sqrt(layer.weight.shape[2])
+            for tensor in (layer.weight, layer.bias):
+                tensor[s].uniform_(-bound, bound, generator=generator)
+
+
+@torch.no_grad()
+def initialize_orthogonal(
+    net: Mlp, generators: Sequence[torch.Generator], head_gain: float, gain: float = math.sqrt(2)
+) -> None:
+    """Make each seed's weights orthogonal (Saxe et al. 2014) and its biases zero.
+
+    Seed by seed: `torch.nn.init.orthogonal_` takes a three-dimensional tensor for one flattened matrix.
+
+    Args:
+        net: the networks, changed in place.
+        generators: one per seed.
+        head_gain: of the last layer; small, it makes the first policy the same in every state.
+        gain: of the layers before.
+    """
+    for s, generator in enumerate(generators):
+        for i, layer in enumerate(net.layers):
+            last = i == len(net.layers) - 1
+            torch.nn.init.orthogonal_(layer.weight[s], head_gain if last else gain, generator=generator)
+            layer.bias[s].zero_()

@@ -1,0 +1,268 @@
+"""Acting: S policies in S environments, T steps, and what they saw.
+
+Acting is plain NumPy, a few microseconds per step; values and log-probabilities are computed once, after
+the rollout, from whole arrays. The environments must reset within the step that ends an episode
+(`AutoresetMode.SAME_STEP`), which leaves no dummy transition in the data and hands over the final observation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+from torch import Tensor
+
+from inbounds.learning.actor_critic import ActorCritic
+from inbounds.learning.advantages import gae
+from inbounds.learning.laws import Parameters
+from inbounds.learning.normalize import RunningNormalizer
+from inbounds.learning.policies import SATURATION_MARGIN
+from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
+
+ActionMode = Literal["clip", "raw"]
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """T steps of S seeds."""
+
+    obs: Tensor
+    """`[S, T, O]` as the networks saw it (normalised, if the run normalises)."""
+    latent: Tensor
+    """`[S, T, A]` what the law drew. Never reconstructed from the action, which may have lost it."""
+    action: Tensor
+    """`[S, T, A]` what was executed, in the robot's units."""
+    reward: Tensor
+    """`[S, T]` undiscounted, unscaled."""
+    terminated: Tensor
+    """`[S, T]` booleans: the episode ended by itself after this step."""
+    truncated: Tensor
+    """`[S, T]` booleans: the episode was cut off after this step."""
+    bootstrap: Tensor
+    """`[S, T]` value of the observation after the step where it was truncated and at the last step, else 0."""
+    value: Tensor
+    """`[S, T]` value of `obs`."""
+    log_prob: Tensor
+    """`[S, T]` log-density of `latent`, in nats."""
+    parameters: Parameters
+    """`[S, T, A]` each: the law that drew `latent`."""
+    saturation: NDArray[Any]
+    """`[S]` fraction of executed action components at a bound (within 0.1 % of half the range)."""
+    action_std: NDArray[Any]
+    """`[S]` standard deviation of the executed actions over the rollout, root mean square over dimensions, in units
+    of half the range."""
+    episode_returns: Sequence[Sequence[float]]
+    """For each seed, the returns of the episodes that ended within the rollout."""
+
+    @property
+    def num_seeds(self) -> int:
+        """S."""
+        return self.reward.shape[0]
+
+    @property
+    def horizon(self) -> int:
+        """T."""
+        return self.reward.shape[1]
+
+    def advantages(self, gamma: float, gae_lambda: float) -> tuple[Tensor, Tensor]:
+        """Return advantages and returns, `[S, T]` each: `gae` of this rollout."""
+        return gae(
+            self.reward, self.value, self.terminated, self.truncated, self.bootstrap, gamma, gae_lambda
+        )
+
+
+class Collector:
+    """The acting side of a run: environments, generators, statistics, and where each episode stands.
+
+    Args:
+        envs: one environment per seed, `AutoresetMode.SAME_STEP`, bounded one-dimensional Box of actions.
+        networks: the policies that act and the values that judge.
+        streams: the generators of each seed.
+        normalize_obs: keep running statistics and show the networks normalised observations.
+        action_mode: "clip" actions to the box before the environment sees them, or pass them "raw".
+
+    Raises:
+        ValueError: the environments reset in another way, or are not as many as the seeds.
+    """
+
+    def __init__(
+        self,
+        envs: VectorEnv[Any, Any, Any],
+        networks: ActorCritic,
+        streams: Sequence[SeedStreams],
+        normalize_obs: bool,
+        action_mode: ActionMode = "clip",
+    ) -> None:
+        check_environments(envs, len(streams))
+        self.envs, self.networks, self.policy = envs, networks, networks.policy
+        self.streams, self.action_mode = streams, action_mode
+        self.dtype = np.dtype(str(networks.dtype).removeprefix("torch."))
+        self.obs_dim = gymnasium.spaces.flatdim(envs.single_observation_space)
+        self.normalizer = RunningNormalizer(len(streams), self.obs_dim, self.dtype) if normalize_obs else None
+        self.action_dtype = envs.single_action_space.dtype
+        self.low, self.high, self.centre = (
+            bound.astype(self.action_dtype)
+            for bound in (self.policy.low, self.policy.high, self.policy.centre)
+        )
+        self.returns = np.zeros(len(streams))  # of the episodes under way
+        self.restart()
+
+    def restart(self) -> None:
+        """Start new episodes everywhere, from each seed's own environment seed."""
+        seeds: Any = [
+            stream.environment for stream in self.streams
+        ]  # VectorEnv declares int, all take a list
+        obs, _ = self.envs.reset(seed=seeds)
+        self.obs = self._see(obs)
+        self.returns[:] = 0
+
+    def collect(self, horizon: int) -> Rollout:
+        """Act for T steps and return what happened.
+
+        Args:
+            horizon: T, in env steps per seed.
+
+        Returns:
+            The rollout; episodes under way go on in the next one.
+        """
+        num_seeds, act_dim = len(self.streams), self.policy.act_dim
+        draw = self.policy.law.sampler([s.noise for s in self.streams], horizon, act_dim, self.dtype)
+        obs = np.empty((num_seeds, horizon, self.obs_dim), self.dtype)
+        latent = np.empty((num_seeds, horizon, act_dim), self.dtype)
+        action = np.empty((num_seeds, horizon, act_dim), self.action_dtype)
+        reward = np.empty((num_seeds, horizon))
+        terminated = np.empty((num_seeds, horizon), np.bool_)
+        truncated = np.empty((num_seeds, horizon), np.bool_)
+        bootstrap = np.zeros((num_seeds, horizon), self.dtype)
+        episode_returns: list[list[float]] = [[] for _ in range(num_seeds)]
+        for t in range(horizon):
+            obs[:, t] = self.obs
+            parameters = self.policy.parameters(self.networks.actor.act(self.obs), np)
+            latent[:, t] = z = draw(parameters, t)
+            action[:, t] = executed = self._executed(z)
+            next_obs, reward[:, t], terminated[:, t], truncated[:, t], info = self.envs.step(executed)
+            self.returns += reward[:, t]
+            if (over := terminated[:, t] | truncated[:, t]).any():
+                self._end_episodes(over, episode_returns)
+                if truncated[:, t].any():
+                    bootstrap[:, t] = self._final_values(truncated[:, t], info)
+            self.obs = self._see(next_obs)
+        last = self.networks.critic.act(self.obs)[:, 0]
+        bootstrap[:, -1] = np.where(truncated[:, -1], bootstrap[:, -1], last)
+        return self._rollout(
+            obs, latent, action, reward, terminated, truncated, bootstrap, episode_returns=episode_returns
+        )
+
+    def _see(self, obs: NDArray[Any]) -> NDArray[Any]:
+        """Return observations as the networks see them, `[S, O]`, taking them into the statistics."""
+        obs = np.reshape(obs, (len(self.streams), -1))
+        if self.normalizer is None:
+            return obs.astype(self.dtype)
+        self.normalizer.update(obs)
+        return self.normalizer(obs)
+
+    def _executed(self, latent: NDArray[Any]) -> NDArray[Any]:
+        """Return the actions for latents `[S, A]`; a diverged seed holds still, in the middle of its box."""
+        action = self.policy.action(latent).astype(self.action_dtype)
+        if self.action_mode == "clip":
+            action = np.minimum(np.maximum(action, self.low), self.high)
+        if not np.isfinite(action).all():
+            action = np.where(np.isfinite(action), action, self.centre)
+        return action
+
+    def _end_episodes(self, over: NDArray[np.bool_], episode_returns: list[list[float]]) -> None:
+        for s in np.flatnonzero(over):
+            episode_returns[s].append(float(self.returns[s]))
+        self.returns[over] = 0
+
+    def _final_values(self, truncated: NDArray[np.bool_], info: dict[str, Any]) -> NDArray[Any]:
+        """Return the values `[S]` of the final observations of truncated episodes, 0 elsewhere.
+
+        The value networks of all seeds are evaluated, so that a seed's arithmetic does not depend on when the
+        others' episodes end.
+        """
+        final_obs = np.zeros((len(self.streams), self.obs_dim))
+        for s in np.flatnonzero(truncated):
+            final_obs[s] = np.ravel(info["final_obs"][s])
+        seen = final_obs.astype(self.dtype) if self.normalizer is None else self.normalizer(final_obs)
+        return np.where(truncated, self.networks.critic.act(seen)[:, 0], 0)
+
+    def _rollout(self, *arrays: NDArray[Any], episode_returns: list[list[float]]) -> Rollout:
+        """Compute once, from whole arrays, what acting did not need."""
+        tensors = [torch.from_numpy(array) for array in arrays]
+        obs, latent, action, reward, terminated, truncated, bootstrap = tensors
+        with torch.no_grad():
+            parameters = self.networks.parameters(obs)
+            log_prob = self.policy.law.log_prob(parameters, latent)
+            value = self.networks.values(obs).contiguous()
+        unit = (arrays[2] - self.policy.centre) / self.policy.half_range  # [S, T, A] executed
+        return Rollout(
+            obs=obs,
+            latent=latent,
+            action=action,
+            reward=reward.to(self.networks.dtype),
+            terminated=terminated,
+            truncated=truncated,
+            bootstrap=bootstrap,
+            value=value,
+            log_prob=log_prob,
+            parameters=parameters,
+            saturation=(np.abs(unit) >= 1 - SATURATION_MARGIN).mean((1, 2)),
+            action_std=np.sqrt(np.clip(unit, -1, 1).var(1).mean(1)),
+            episode_returns=episode_returns,
+        )
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that the future depends on; physics included, if the environments have `get_state`."""
+        get_state = getattr(self.envs.unwrapped, "get_state", None)
+        return {
+            "envs": get_state() if get_state is not None else None,
+            "obs": self.obs.copy(),
+            "returns": self.returns.copy(),
+            "normalizer": self.normalizer and self.normalizer.state_dict(),
+            "noise": generator_states([stream.noise for stream in self.streams]),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go back to a state. Environments without `set_state` start new episodes instead."""
+        restore_generators([stream.noise for stream in self.streams], state["noise"])
+        if state["envs"] is None:
+            self.restart()
+        if self.normalizer is not None:
+            self.normalizer.load_state_dict(state["normalizer"])
+        if state["envs"] is not None:
+            unwrapped: Any = self.envs.unwrapped
+            unwrapped.set_state(state["envs"])
+            self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
+
+
+def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
+    """Raise unless the environments are ones a `Collector` can act in.
+
+    Args:
+        envs: the environments.
+        num_seeds: how many there must be.
+
+    Raises:
+        ValueError: another number, another autoreset mode, or actions that are no bounded one-dimensional Box.
+    """
+    if envs.num_envs != num_seeds:
+        raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
+    mode = envs.metadata.get("autoreset_mode")
+    if mode != AutoresetMode.SAME_STEP:
+        raise ValueError(
+            f"the environments reset in the mode {mode}, which puts dummy transitions into the data: make them with "
+            "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP"
+        )
+    box = envs.single_action_space
+    if not isinstance(box, gymnasium.spaces.Box) or len(box.shape) != 1 or not box.is_bounded():
+        raise ValueError(
+            f"actions must be a bounded, one-dimensional Box, got {box}: wrap the environment "
+            "(gymnasium.wrappers.RescaleAction, FlattenAction) so that they are"
+        )

@@ -1,0 +1,233 @@
+"""One loop for all algorithms: act, learn, record, save.
+
+>>> from inbounds.learning import preset, train
+>>> run = train(preset("common", "Swimmer-v5", policy="logit-normal", seeds=2, epochs=1))
+>>> run.records[-1]["env_steps"], run.records[-1]["kl"].shape
+(2048, (2,))
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+
+from inbounds.learning import checkpoint
+from inbounds.learning.actor_critic import ActorCritic
+from inbounds.learning.config import ALGORITHMS, TrainConfig
+from inbounds.learning.policies import Policy
+from inbounds.learning.rollout import Collector, Rollout
+from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
+from inbounds.robots.registration import TASK_NAMES
+from inbounds.robots.registration import make as make_robots
+
+Record: TypeAlias = dict[str, Any]
+"""One epoch: `epoch`, `env_steps` (per seed, so far), `seconds` of wall time, and arrays `[S]` by name."""
+Environments: TypeAlias = VectorEnv[Any, Any, Any]
+
+
+class DivergedSeedWarning(RuntimeWarning):
+    """A seed's weights are no longer finite: it stands still and is marked, the others go on."""
+
+
+class Trainer:
+    """A run under way: its state, and one epoch at a time.
+
+    Args:
+        config: what to do.
+        make_envs: makes the vector environment for a number of seeds; None makes `config.env`.
+
+    Example:
+        >>> from inbounds.learning.config import preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
+        >>> record = trainer.epoch()
+        >>> record["epoch"], record["env_steps"], record["episodes"].shape
+        (0, 2048, (2,))
+    """
+
+    def __init__(self, config: TrainConfig, make_envs: Callable[[int], Environments] | None = None) -> None:
+        self.config = config
+        self.streams = [SeedStreams.of(seed) for seed in config.seeds]
+        num_seeds = len(config.seeds)
+        self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
+        space = self.envs.single_action_space
+        if not isinstance(space, gymnasium.spaces.Box):
+            raise ValueError(f"actions must be a bounded, one-dimensional Box, got {space}")
+        policy = Policy(config.policy, space.low, space.high)
+        obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
+        generators = [stream.initialization for stream in self.streams]
+        self.networks = ActorCritic(policy, obs_dim, config.network, generators)
+        self.collector = Collector(
+            self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode
+        )
+        self._algorithm = ALGORITHMS[config.algorithm_name][1]
+        self.optimizer = self._algorithm.make_optimizer(self.networks, config.algorithm)
+        self.records: list[Record] = []
+        self.diverged = np.zeros(num_seeds, np.bool_)
+
+    def epoch(self) -> Record:
+        """Collect one rollout, do one update, and return the record, which also joins `records`."""
+        start = time.perf_counter()
+        algorithm = self.config.algorithm
+        with one_thread():
+            rollout = self.collector.collect(algorithm.horizon)
+            shuffles = [stream.shuffle for stream in self.streams]
+            diagnostics = self._algorithm.update(self.networks, self.optimizer, rollout, shuffles, algorithm)
+        self._mark_diverged()
+        record: Record = {
+            "epoch": len(self.records),
+            "env_steps": algorithm.horizon * (len(self.records) + 1),
+            "seconds": time.perf_counter() - start,
+            **episode_statistics(rollout),
+            "saturation": rollout.saturation,
+            "action_std": rollout.action_std,
+            **{name: value.double().numpy() for name, value in diagnostics.items()},
+            "diverged": self.diverged.copy(),
+        }
+        self.records.append(record)
+        return record
+
+    def _mark_diverged(self) -> None:
+        """Mark, and warn of, the seeds whose weights have just ceased to be finite."""
+        now = ~self.networks.finite().numpy()
+        if (new := now & ~self.diverged).any():
+            seeds = [seed for seed, is_new in zip(self.config.seeds, new, strict=True) if is_new]
+            warnings.warn(
+                f"seeds {seeds} diverged in epoch {len(self.records)}: their weights are not finite. They are marked "
+                "in every later record; leave them out of means, or train with a smaller learning_rate",
+                DivergedSeedWarning,
+                stacklevel=3,
+            )
+        self.diverged |= now
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that the future depends on, and the records so far."""
+        return {
+            "config": describe(self.config),
+            "networks": self.networks.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "collector": self.collector.state_dict(),
+            "shuffle": generator_states([stream.shuffle for stream in self.streams]),
+            "records": self.records,
+            "diverged": self.diverged,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go back to a state from `state_dict` of a run with the same configuration.
+
+        Raises:
+            ValueError: another configuration wrote it; more epochs than planned then are allowed.
+        """
+        ours, theirs = describe(self.config), state["config"]
+        different = [key for key in ours if ours[key] != theirs.get(key) and key not in _FREE_TO_CHANGE]
+        if different:
+            changes = "; ".join(f"{key}: {theirs.get(key)} → {ours[key]}" for key in different)
+            raise ValueError(
+                f"the checkpoint belongs to another configuration ({changes}): "
+                "use that one, or another run directory"
+            )
+        self.networks.load_state_dict(state["networks"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.collector.load_state_dict(state["collector"])
+        restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
+        self.records = list(state["records"])
+        self.diverged = state["diverged"].copy()
+
+
+_FREE_TO_CHANGE = ("epochs", "checkpoint_every")
+
+
+def train(
+    config: TrainConfig,
+    *,
+    run_dir: str | Path | None = None,
+    make_envs: Callable[[int], Environments] | None = None,
+    callback: Callable[[Trainer, Record], None] | None = None,
+) -> Trainer:
+    """Train to the last epoch, going on from the run directory's checkpoint if there is one.
+
+    A resumed run is, bit for bit, the run that was never interrupted, if the environments can save their state
+    (`get_state`, `set_state`, as those of `inbounds.robots`); others start new episodes where the run resumes.
+
+    Args:
+        config: what to do.
+        run_dir: where to keep the checkpoint; None keeps none.
+        make_envs: makes a vector environment (`AutoresetMode.SAME_STEP`) for a number of seeds; None makes
+            `config.env`.
+        callback: called after every epoch with the trainer and the record: a progress bar, a logger.
+
+    Returns:
+        The finished run: `records`, `networks`, `diverged`, `collector`.
+
+    Raises:
+        ValueError: the run directory belongs to another configuration.
+    """
+    trainer = Trainer(config, make_envs)
+    path = None
+    if run_dir is not None:
+        Path(run_dir).mkdir(parents=True, exist_ok=True)
+        path = Path(run_dir) / checkpoint.FILE_NAME
+        if path.exists():
+            trainer.load_state_dict(checkpoint.load(path))
+    while len(trainer.records) < config.epochs and not trainer.diverged.all():
+        record = trainer.epoch()
+        done = len(trainer.records)
+        if path is not None and (done % config.checkpoint_every == 0 or done == config.epochs):
+            checkpoint.save(path, trainer.state_dict())
+        if callback is not None:
+            callback(trainer, record)
+    return trainer
+
+
+def make_environments(config: TrainConfig, num_envs: int) -> Environments:
+    """Return one environment per seed: robots in one batch where we have them, else Gymnasium's, one by one.
+
+    Args:
+        config: names the environment and the action mode.
+        num_envs: number of seeds.
+
+    Returns:
+        A vector environment that resets in the step that ends an episode.
+    """
+    if config.env.removeprefix("inbounds/") in TASK_NAMES:
+        return make_robots(config.env, num_envs, action_mode=config.action_mode)
+    return SyncVectorEnv(
+        [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
+    )
+
+
+def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
+    """Return, per seed, the number of episodes that ended and the mean of their returns (NaN where none did)."""
+    returns: Sequence[Sequence[float]] = rollout.episode_returns
+    return {
+        "episodes": np.array([len(r) for r in returns]),
+        "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
+    }
+
+
+def describe(config: TrainConfig) -> dict[str, Any]:
+    """Return a configuration as nested plain dictionaries, the algorithm's name included."""
+    return {**dataclasses.asdict(config), "algorithm_name": config.algorithm_name}
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Run torch on one thread: its matrices are small here, and results then do not depend on the machine's cores.
+
+    Two processes of one thread each do more in a given time than one process of two.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
