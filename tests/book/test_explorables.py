@@ -260,6 +260,8 @@ def test_initial_values_are_the_sliders() -> None:
     mu, log_sigma = explorable.controls
     assert (mu.value, np.exp(log_sigma.value)) == (-0.5, pytest.approx(2.0))
     assert "μ = -0.5, σ = 2" in explorable.alt
+    # m = tanh(-0.25), s = 1 - m²: 21.1 % below -1, 9.3 % above 1
+    assert "21.1% of its actions on the lower and 9.3% on the upper" in explorable.alt
 
 
 @pytest.mark.parametrize(("mu", "sigma"), [(5.0, 1.0), (0.0, 3.0), (0.0, 0.0), (0.0, -1.0)])

@@ -6,11 +6,11 @@ import pytest
 import torch
 from playwright.sync_api import BrowserContext, Locator, Page
 
+from inbounds.book.explorables import bounded_densities, javascript_files
 from inbounds.distributions import LogitNormal
 from tests.pages import browser as book
 
 PAGES = book.pages('class="inbounds-explorable"')
-LIVE = ".inbounds-explorable[data-state=live]"
 # Alphas of everything painted on the canvases below a node, shadow roots included.
 PAINTED = """root => {
   let painted = 0;
@@ -141,7 +141,6 @@ def test_follows_the_theme(context: BrowserContext, address: str, name: str) -> 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_fits_a_phone(context: BrowserContext, address: str, name: str) -> None:
-    context.add_init_script("window.innerWidthBefore = innerWidth")
     page = context.new_page()
     page.set_viewport_size(book.PHONE)
     page.goto(address + name)
@@ -211,3 +210,28 @@ def test_bounded_densities_shows_the_package_s_numbers(context: BrowserContext, 
             modes = [float(mode) for mode in cells["modes"].split(" and ")]
             assert len(modes) == (2 if law.is_bimodal else 1)
             assert min(abs(mode - float(law.mode)) for mode in modes) < 6e-4
+
+
+def test_live_outputs_start_and_load_bokeh_once(context: BrowserContext) -> None:
+    """As JupyterLab shows them: HTML first, its scripts run afterwards; each output brings BokehJS, one is enough."""
+    page = context.new_page()
+    page.set_content("<!doctype html><html><head></head><body data-jp-theme-light='true'></body></html>")
+    insert = """html => {
+      const output = document.body.appendChild(document.createElement('div'));
+      output.innerHTML = html;
+      for (const script of output.querySelectorAll('script')) {
+        const copy = document.createElement('script');
+        for (const { name, value } of script.attributes) copy.setAttribute(name, value);
+        copy.textContent = script.textContent;
+        script.replaceWith(copy);
+      }
+    }"""
+    for number in (1, 2):
+        page.evaluate(insert, bounded_densities(mu=number / 2).html(live=True))
+        page.wait_for_function("n => document.querySelectorAll('[data-state=live]').length === n", arg=number)
+        assert page.locator("head script").count() == len(javascript_files())
+    for explorable in explorables(page):
+        assert explorable.evaluate(PAINTED) > 2000
+        assert explorable.get_attribute("data-theme") == "light"
+    page.evaluate("document.body.dataset.jpThemeLight = 'false'")
+    page.wait_for_function("document.querySelectorAll('[data-state=live][data-theme=dark]').length === 2")

@@ -68,6 +68,18 @@ class MatchedLaws:
         return m, 0.5 * self.sigma * (1.0 - m * m)
 
     @property
+    def atoms(self) -> tuple[float, float]:
+        """Probabilities that the clipped Gaussian sits at -1 and at 1.
+
+        Example:
+            >>> low, high = MatchedLaws(mu=0.0, sigma=2.0).atoms
+            >>> round(low, 4), round(high, 4)
+            (0.1587, 0.1587)
+        """
+        m, s = self.gaussian
+        return float(stats.norm.cdf(-1.0, m, s)), float(stats.norm.sf(1.0, m, s))
+
+    @property
     def beta(self) -> tuple[float, float]:
         """α and β of the Beta with the logit-normal's mean and variance; a Beta policy needs both above 1."""
         centre = 0.5 * (1.0 + float(self.logit_normal.mean))
@@ -106,9 +118,10 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
         name="bounded-densities",
         title="three policies on a bounded action, over location μ and scale σ",
         alt=(
-            "Densities of a Gaussian clipped by the simulator, a Beta and a logit-normal on the interval from -1 to 1. "
-            f"At μ = {mu:g}, σ = {sigma:g} the Gaussian puts part of its mass on the upper bound; "
-            "the logit-normal and the Beta put none there."
+            "Densities on the interval from -1 to 1: a Gaussian clipped by the simulator, a logit-normal, and the Beta "
+            f"of its mean and spread if there is one. At μ = {mu:g}, σ = {sigma:g} the Gaussian puts "
+            f"{laws.atoms[0]:.1%} of its actions on the lower and {laws.atoms[1]:.1%} on the upper bound, "
+            "the others none."
         ),
         controls=(
             slider("mu", "location μ", -4.0, 4.0, mu, 0.1),
@@ -172,7 +185,7 @@ def _bounded_densities_figure(laws: MatchedLaws) -> Figure:
         atoms.set(ylim=(0.0, 1.0), ylabel="probability at a bound")
         atoms.grid(False)
         color = figures.FAMILIES["gaussian"].color
-        for x, mass in ((-1.14, stats.norm.cdf(-1.0, m, s)), (1.14, stats.norm.sf(1.0, m, s))):
+        for x, mass in zip((-1.14, 1.14), laws.atoms, strict=True):
             atoms.bar(x, mass, width=0.14, facecolor="none", edgecolor=color, hatch="////", linewidth=1.6)
             atoms.annotate(
                 f"{mass:.0%}", (x, mass), (0, 3), textcoords="offset points", ha="center", va="bottom"
