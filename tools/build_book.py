@@ -46,7 +46,13 @@ def build(code: str) -> int:
             shutil.rmtree(BUILD / ".doctrees", ignore_errors=True)
     cache.mkdir(parents=True, exist_ok=True)
     STAMP.unlink(missing_ok=True)
-    command = [str(Path(sys.executable).with_name("jupyter-book")), "build", str(ROOT), "--path-output", str(ROOT)]
+    command = [
+        str(Path(sys.executable).with_name("jupyter-book")),
+        "build",
+        str(ROOT),
+        "--path-output",
+        str(ROOT),
+    ]
     return subprocess.run(
         [*command, "--warningiserror", "--nitpick", "--keep-going", "-q"],
         cwd=ROOT,

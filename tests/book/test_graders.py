@@ -64,16 +64,28 @@ def test_an_exception_is_reported(name: str) -> None:
         ("mass_outside", outside, "one probability per coordinate"),
         ("mass_outside", lambda *a: 1 - np.prod(1 - outside(*a)), "tiny probabilities"),
         ("mass_outside", lambda *a: 0.123, "expected"),
-        ("log_prob_from_latent", lambda z, m, s, lo, hi: log_prob(z, m, s, lo, hi) + (hi - lo).log(), "length"),
-        ("log_prob_from_latent", lambda z, m, s, lo, hi: torch.distributions.Normal(m, s).log_prob(z), "Jacobian"),
         (
             "log_prob_from_latent",
-            lambda z, m, s, lo, hi: 2 * torch.distributions.Normal(m, s).log_prob(z) - log_prob(z, m, s, lo, hi),
+            lambda z, m, s, lo, hi: log_prob(z, m, s, lo, hi) + (hi - lo).log(),
+            "length",
+        ),
+        (
+            "log_prob_from_latent",
+            lambda z, m, s, lo, hi: torch.distributions.Normal(m, s).log_prob(z),
+            "Jacobian",
+        ),
+        (
+            "log_prob_from_latent",
+            lambda z, m, s, lo, hi: (
+                2 * torch.distributions.Normal(m, s).log_prob(z) - log_prob(z, m, s, lo, hi)
+            ),
             "wrong sign",
         ),
         (
             "log_prob_from_latent",
-            lambda z, m, s, lo, hi: LogitNormal(m, s, lo, hi, validate_args=False).log_prob(lo + (hi - lo) * z.sigmoid()),
+            lambda z, m, s, lo, hi: LogitNormal(m, s, lo, hi).log_prob(
+                LogitNormal(m, s, lo, hi).latent_to_value(z)
+            ),
             "use softplus",
         ),
         ("entropy_by_quadrature", lambda m, s, lo, hi: stats.norm.entropy(m, s), "Gaussian's entropy"),

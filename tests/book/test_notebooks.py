@@ -163,7 +163,15 @@ def test_a_broken_notebook_fails_the_build(tmp_path: Path) -> None:
     (tmp_path / "_config.yml").write_text(
         (ROOT / "_config.yml").read_text().replace("book/", f"{ROOT}/book/")
     )
-    command = [Path(sys.executable).with_name("jupyter-book"), "build", tmp_path, "-q", "-W", "-n", "--keep-going"]
+    command = [
+        Path(sys.executable).with_name("jupyter-book"),
+        "build",
+        tmp_path,
+        "-q",
+        "-W",
+        "-n",
+        "--keep-going",
+    ]
     for _ in range(2):  # the second run, with everything cached, must fail as well
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         assert done.returncode != 0

@@ -1,7 +1,7 @@
 """Graders for the exercises: they run the reader's function and say what is wrong, in words.
 
-Each grader is named after the exercise's function, and returns a :class:`Verdict` that a notebook shows. An exercise that has
-not been answered (its function still returns ``...``) is not a failure: *Run All* goes on.
+Each grader is named after the exercise's function, and returns a :class:`Verdict` that a notebook shows. An exercise
+that has not been answered (its function still returns ``...``) is not a failure: *Run All* goes on.
 
 The references here are written differently from the chapters' solutions, so that a slip in one is not a slip in both.
 """
@@ -9,7 +9,7 @@ The references here are written differently from the chapters' solutions, so tha
 import html
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,7 +92,9 @@ def agrees(answer: Any, expected: Any, rtol: float) -> bool:
         answer, expected = np.asarray(answer, dtype=np.float64), np.asarray(expected, dtype=np.float64)
     except (TypeError, ValueError):
         return False
-    return answer.shape == expected.shape and np.allclose(answer, expected, rtol=rtol, atol=0.0, equal_nan=True)
+    return answer.shape == expected.shape and np.allclose(
+        answer, expected, rtol=rtol, atol=0.0, equal_nan=True
+    )
 
 
 def brief(value: Any) -> str:
@@ -103,13 +105,15 @@ def brief(value: Any) -> str:
         return repr(value)[:60]
     if array.size == 1:
         return f"{array.item():.6g}"
-    return f"an array of shape {array.shape} that starts with {array.flat[0]:.6g}" if array.size else "nothing"
+    return (
+        f"an array of shape {array.shape} that starts with {array.flat[0]:.6g}" if array.size else "nothing"
+    )
 
 
 def mass_outside(function: Callable[..., Any]) -> Verdict:
     """Chapter *Actions have bounds*: the probability that some coordinate of a Gaussian action leaves its box."""
 
-    def case(loc: Any, scale: Any, low: Any, high: Any, **known: Any) -> Case:
+    def case(loc: Any, scale: Any, low: Any, high: Any) -> Case:
         loc, scale, low, high = (np.asarray(x, dtype=np.float64) for x in (loc, scale, low, high))
         lower, upper = stats.norm.cdf(low, loc, scale), stats.norm.sf(high, loc, scale)
         expected = -math.expm1(np.log1p(-(lower + upper)).sum())
@@ -121,18 +125,13 @@ def mass_outside(function: Callable[..., Any]) -> Verdict:
             "only the lower side is counted": 1 - np.prod(1 - lower),
             "one probability per coordinate: combine them into one for the action": lower + upper,
         }
-        return Case((loc, scale, low, high), expected, mistakes, **known)
+        return Case((loc, scale, low, high), expected, mistakes)
 
+    cancelled = "tiny probabilities cancel: avoid 1 − (number near 1)"
     cases = [
         case([0.3, -0.2], [1.0, 0.5], [-1.0, -1.0], [1.0, 0.4]),
         case([0.0, 0.0, 1.0], [2.0, 0.1, 1.0], [-1.0, -1.0, 0.0], [1.0, 1.0, 3.0]),
-        case(
-            [0.0, 0.0],
-            [0.1, 0.1],
-            [-1.0, -1.0],
-            [1.0, 1.0],
-            hint="tiny probabilities cancel: avoid 1 − (number near 1)",
-        ),
+        replace(case([0.0, 0.0], [0.1, 0.1], [-1.0, -1.0], [1.0, 1.0]), mistakes={}, hint=cancelled),
     ]
     return judge(function, cases, "right, down to the smallest probabilities")
 
@@ -154,11 +153,13 @@ def log_prob_from_latent(function: Callable[..., Any]) -> Verdict:
         }
         return Case(arguments, normal - jacobian - length, mistakes, **known)
 
+    saturated = "at a latent of 40 the sigmoid is 1 to the last bit: use softplus or logsigmoid"
+    overflow = "at a latent of −800 the exponential overflows: use softplus or logsigmoid"
     cases = [
         case(0.4, 0.1, 0.7, -1.0, 1.0),
         case(-1.3, 0.5, 2.0, 0.0, 5.0),
-        case(40.0, 38.0, 2.0, -1.0, 1.0, hint="at a latent of 40 the sigmoid is 1 to the last bit: use softplus or logsigmoid"),
-        case(-800.0, -790.0, 5.0, 0.0, 2.0, hint="at a latent of −800 the exponential overflows: use softplus or logsigmoid"),
+        case(40.0, 38.0, 2.0, -1.0, 1.0, hint=saturated),
+        case(-800.0, -790.0, 5.0, 0.0, 2.0, hint=overflow),
     ]
     return judge(function, cases, "right, at the centre and far out")
 
@@ -182,4 +183,6 @@ def entropy_by_quadrature(function: Callable[..., Any]) -> Verdict:
 
     cases = [case(0.0, 1.0, 0.0, 3.0), case(1.5, 0.4, -1.0, 1.0), case(-0.5, 2.7, -1.0, 1.0)]
     reference = LogitNormal(torch.tensor(0.0), torch.tensor(1.0), 0.0, 3.0).entropy().item()
-    return judge(function, cases, f"right (LogitNormal.entropy() agrees: {reference:.4f} nats in the first case)")
+    return judge(
+        function, cases, f"right (LogitNormal.entropy() agrees: {reference:.4f} nats in the first case)"
+    )
