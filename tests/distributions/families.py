@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 import scipy.stats
 import torch
 from hypothesis import settings
@@ -18,6 +19,11 @@ few = settings(max_examples=25, deadline=None, derandomize=True)
 
 def floats(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high, allow_nan=False, width=64)
+
+
+def relatively(value: float, rel: float) -> Any:
+    """Compare by relative error alone: approx by itself also accepts whatever is within 1e-12."""
+    return pytest.approx(value, rel=rel, abs=0.0)
 
 
 @st.composite

@@ -204,7 +204,7 @@ def test_double_derivatives_agree_with_differences(family: Family) -> None:
     def quantities(first: torch.Tensor, second: torch.Tensor) -> tuple[torch.Tensor, ...]:
         law = family.law(first, second, -1.0, 2.0, validate_args=False)
         other = family.law(second, second, -1.0, 2.0, validate_args=False)  # any law that depends on both
-        value = torch.tensor([-0.5, 0.3, 1.7, 1.99], dtype=torch.float64)
+        value = torch.tensor([[-0.5], [1.99]], dtype=torch.float64)
         return (
             law.log_prob(value),
             law.log_prob_latent(value),
@@ -215,7 +215,7 @@ def test_double_derivatives_agree_with_differences(family: Family) -> None:
             kl_divergence(other, law),
         )
 
-    inputs = tuple(p.requires_grad_() for p in family.parameters((4,), seed=5))
+    inputs = tuple(p.requires_grad_() for p in family.parameters((2,), seed=5))
     assert torch.autograd.gradcheck(quantities, inputs)
     assert torch.autograd.gradgradcheck(quantities, inputs)
 
