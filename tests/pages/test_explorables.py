@@ -1,6 +1,7 @@
 """Explorables in the built book: they render, answer the keyboard, follow the theme, and leave a figure behind."""
 
 import math
+import re
 
 import pytest
 import torch
@@ -167,14 +168,14 @@ def test_leaves_a_figure_where_it_cannot_run(
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     if without == "BokehJS":
-        page.route("**/bokeh*.js", lambda route: route.abort())
+        page.route(re.compile(r"/bokeh[^/]*\.js"), lambda route: route.abort())
     page.goto(address + name, wait_until="networkidle")
     for explorable in explorables(page):
         image = explorable.locator(".inbounds-static img")
         assert image.is_visible()
         assert len(image.get_attribute("alt") or "") > 40
         assert not explorable.locator(".inbounds-live").is_visible()
-    assert [error for error in errors if "okeh" not in error] == []
+    assert errors == []
     bare.close()
 
 
