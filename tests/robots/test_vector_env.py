@@ -2,6 +2,8 @@
 
 import pickle
 import re
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -331,6 +333,13 @@ def test_gymnasium_can_make_them(name):
     assert make(f"inbounds/{name}").name == name
     again = gymnasium.make_vec(envs.spec)  # a specification makes the same environment again
     assert (again.num_envs, again.action_mode) == (2, "raw")
+
+
+def test_the_id_can_name_the_module_to_import():
+    code = "import gymnasium; print(gymnasium.make_vec('inbounds.robots.vector_env:inbounds/Swimmer-v5', num_envs=3))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "RobotVectorEnv(inbounds/Swimmer-v5, num_envs=3)"
+    assert done.stderr == ""
 
 
 def test_registering_twice_does_no_harm():

@@ -29,7 +29,6 @@ def only(mask: NDArray[np.bool_], info: dict[str, NDArray[Any]]) -> dict[str, ND
     """
     if not mask.any():
         return {}
-    kept = {key: np.zeros_like(values) for key, values in info.items()}
-    for key, values in info.items():
-        kept[key][mask] = values[mask]
-    return kept
+    return {
+        key: np.where(mask, values.T, 0).T for key, values in info.items()
+    }  # .T: the mask is along axis 0

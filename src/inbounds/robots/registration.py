@@ -1,8 +1,8 @@
 """The six tasks under Gymnasium's own roof: ``gymnasium.make_vec("inbounds/HalfCheetah-v5", num_envs=10)``.
 
 The ids are ``inbounds/`` and Gymnasium's name of the task: the same task to the last bit, another engine under it.
-Importing :mod:`inbounds.robots.vector_env` registers them. This module itself imports no more than Gymnasium's
-registry, so that it can also serve as a plug-in (entry point ``gymnasium.envs``).
+They are known once anything that steps robots has been imported, such as :func:`make`; or the id itself names the
+module to import: ``"inbounds.robots.vector_env:inbounds/HalfCheetah-v5"``.
 """
 
 from typing import TYPE_CHECKING, Any
