@@ -95,7 +95,8 @@ class RobotRenderer:
             self._renderer = mujoco.Renderer(self._model, height, width)
         except Exception as error:  # each backend has exceptions of its own
             raise RuntimeError(
-                f"OpenGL could not be started ({error}). On Debian or Ubuntu: {headless.PACKAGES_HINT}"
+                f"OpenGL could not be started ({error}). Without a display, set MUJOCO_GL=egl before Python starts; "
+                f"on Debian or Ubuntu: {headless.PACKAGES_HINT}"
             ) from error
         self._centre, self._radius, height_range = _extent(self._model)
         is_flat = height_range < 0.1 * self._radius  # as Swimmer is: seen from above
