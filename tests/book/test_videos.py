@@ -48,7 +48,8 @@ def test_the_encoding_is_what_browsers_play(tmp_path):
     assert len(frames) == 25
     assert frames[0].mean() == pytest.approx(200, abs=4)  # it starts with frame 0
     assert frames[1].mean() == pytest.approx(60, abs=4)
-    assert b"ctts" not in video.mp4  # no frame is shown out of order, so nothing has to be skipped at the start
+    # no frame is shown out of order, so that nothing has to be skipped at the start
+    assert b"ctts" not in video.mp4
     # the index precedes the data, so that the duration is known early
     assert video.mp4.index(b"moov") < video.mp4.index(b"mdat")
 
