@@ -67,4 +67,5 @@ def normalize_advantage(advantage: Tensor) -> Tensor:
                [-0.707,  0.707]], dtype=float32)
     """
     centred = advantage - advantage.mean(-1, keepdim=True)
-    return centred / (advantage.std(-1, keepdim=True) + 1e-8)
+    variance = centred.square().sum(-1, keepdim=True) / (advantage.shape[-1] - 1)
+    return centred / (variance.sqrt() + 1e-8)

@@ -22,6 +22,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+_ROW_MULTIPLE = 16  # numbers; 64 bytes of float32
+
 
 class _Tanh(torch.autograd.Function):
     """tanh by NumPy, on one core several times as fast as torch's; differentiable to any order."""
@@ -101,15 +103,19 @@ class Mlp:
             shape for n_in, n_out in itertools.pairwise(self.sizes) for shape in ((n_out, n_in), (n_out, 1))
         ]
         self._lengths = [rows * columns for rows, columns in shapes]
-        self.theta = torch.zeros(num_seeds, sum(self._lengths), dtype=dtype)
-        self.theta.grad = torch.zeros_like(self.theta)
+        count = sum(self._lengths)
+        # Rows of whole cache lines: every seed's weights lie in memory as every other's do, so that the matrix library
+        # and the vector instructions treat them alike, and a seed's result is the same in any row.
+        self.padded = torch.zeros(num_seeds, -(-count // _ROW_MULTIPLE) * _ROW_MULTIPLE, dtype=dtype)
+        self.padded.grad = torch.zeros_like(self.padded)
+        self.theta = self.padded[:, :count]
         self.parameters = [
             part.unflatten(1, shape).detach().requires_grad_()
             for part, shape in zip(self.theta.split(self._lengths, 1), shapes, strict=True)
         ]
         self._gradients = [
             part.unflatten(1, shape)
-            for part, shape in zip(self.theta.grad.split(self._lengths, 1), shapes, strict=True)
+            for part, shape in zip(self.padded.grad[:, :count].split(self._lengths, 1), shapes, strict=True)
         ]
         self.layers = [SeedLinear(*pair) for pair in zip(*[iter(self.parameters)] * 2, strict=True)]
         self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
@@ -129,7 +135,7 @@ class Mlp:
         return (weight @ h + bias)[:, :, 0]
 
     def store_gradients(self, gradients: Sequence[Tensor]) -> None:
-        """Write gradients, one per parameter in order, into `theta.grad`, where the optimiser reads them."""
+        """Write gradients, one per parameter in order, into `padded.grad`, where the optimiser reads them."""
         for target, gradient in zip(self._gradients, gradients, strict=True):
             target.copy_(gradient)
 

@@ -30,7 +30,7 @@ class SeedAdam:
         self.networks = tuple(networks)
         self.parameters = [p for network in self.networks for p in network.parameters]
         self.max_grad_norm = max_grad_norm
-        self._adam = torch.optim.Adam([n.theta for n in self.networks], learning_rate, eps=eps, fused=True)
+        self._adam = torch.optim.Adam([n.padded for n in self.networks], learning_rate, eps=eps, fused=True)
 
     def minimize(self, loss: Tensor) -> None:
         """Take one step down the gradient of a loss that sums over seeds."""
@@ -42,7 +42,7 @@ class SeedAdam:
             start = stop
         if self.max_grad_norm is not None:
             clip_gradients(
-                [n.theta.grad for n in self.networks if n.theta.grad is not None], self.max_grad_norm
+                [n.padded.grad for n in self.networks if n.padded.grad is not None], self.max_grad_norm
             )
         self._adam.step()
 

@@ -117,7 +117,7 @@ class Collector:
         """Start new episodes everywhere, from each seed's own environment seed."""
         seeds: Any = [
             stream.environment for stream in self.streams
-        ]  # VectorEnv declares int, all take a list
+        ]  # a list is fine, whatever VectorEnv declares
         obs, _ = self.envs.reset(seed=seeds)
         self.obs = self._see(obs)
         self.returns[:] = 0
@@ -141,19 +141,20 @@ class Collector:
         truncated = np.empty((num_seeds, horizon), np.bool_)
         bootstrap = np.zeros((num_seeds, horizon), self.dtype)
         episode_returns: list[list[float]] = [[] for _ in range(num_seeds)]
-        for t in range(horizon):
-            obs[:, t] = self.obs
-            parameters = self.policy.parameters(self.networks.actor.act(self.obs), np)
-            latent[:, t] = z = draw(parameters, t)
-            action[:, t] = executed = self._executed(z)
-            next_obs, reward[:, t], terminated[:, t], truncated[:, t], info = self.envs.step(executed)
-            self.returns += reward[:, t]
-            if (over := terminated[:, t] | truncated[:, t]).any():
-                self._end_episodes(over, episode_returns)
-                if truncated[:, t].any():
-                    bootstrap[:, t] = self._final_values(truncated[:, t], info)
-            self.obs = self._see(next_obs)
-        last = self.networks.critic.act(self.obs)[:, 0]
+        with np.errstate(invalid="ignore"):  # a diverged seed computes with NaN, in silence
+            for t in range(horizon):
+                obs[:, t] = self.obs
+                parameters = self.policy.parameters(self.networks.actor.act(self.obs), np)
+                latent[:, t] = z = draw(parameters, t)
+                action[:, t] = executed = self._executed(z)
+                next_obs, reward[:, t], terminated[:, t], truncated[:, t], info = self.envs.step(executed)
+                self.returns += reward[:, t]
+                if (over := terminated[:, t] | truncated[:, t]).any():
+                    self._end_episodes(over, episode_returns)
+                    if truncated[:, t].any():
+                        bootstrap[:, t] = self._final_values(truncated[:, t], info)
+                self.obs = self._see(next_obs)
+            last = self.networks.critic.act(self.obs)[:, 0]
         bootstrap[:, -1] = np.where(truncated[:, -1], bootstrap[:, -1], last)
         return self._rollout(
             obs, latent, action, reward, terminated, truncated, bootstrap, episode_returns=episode_returns

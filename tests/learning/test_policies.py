@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
+from inbounds.learning import FAMILIES, Parameters, Policy, PolicyConfig, executed_std
+from inbounds.learning.initial_noise import head_bias
+from tests.learning.small import FAMILIES as NAMES
+
+LOW, HIGH = np.array([-2.0, 0.5]), np.array([1.0, 4.5])
+
+
+def policy(family: str) -> Policy:
+    return Policy(PolicyConfig(family), LOW, HIGH)
+
+
+def parameters(family: str, spread: float = -0.3) -> Parameters:
+    first = torch.tensor([[0.4, -1.2], [0.0, 0.7]], dtype=torch.float64)
+    if family == "beta":
+        return Parameters(2 + first.abs(), 1.5 + first.square())
+    return Parameters(first, torch.full_like(first, spread))
+
+
+def action_law(family: str, p: Parameters) -> LogitNormal | ScaledBeta | ClippedNormal:
+    kind = {"logit-normal": LogitNormal, "beta": ScaledBeta}.get(family, ClippedNormal)
+    second = p.second if family == "beta" else p.second.exp()
+    return kind(p.first, second, -1.0, 1.0)
+
+
+def test_gaussian_and_logit_normal_share_one_law() -> None:
+    assert FAMILIES["gaussian"].law is FAMILIES["logit-normal"].law
+
+
+@pytest.mark.parametrize("family", NAMES)
+def test_the_map_takes_the_latents_range_to_the_box(family: str) -> None:
+    ends = np.array([[0.0] * 2, [0.5] * 2, [1.0] * 2]) if family == "beta" else None
+    if ends is None:
+        far = 1.0 if family == "gaussian" else 40.0
+        ends = np.array([[-far] * 2, [0.0] * 2, [far] * 2])
+    action = policy(family).action(ends)
+    assert np.allclose(action, np.stack([LOW, (LOW + HIGH) / 2, HIGH]))
+    assert (np.diff(policy(family).action(np.linspace(ends[0], ends[2], 9)), axis=0) >= 0).all()
+
+
+def test_only_the_gaussian_leaves_the_box() -> None:
+    far = np.array([[3.0, -3.0]])
+    assert (policy("gaussian").action(far) > HIGH).any()
+    for family in ("clipped-gaussian", "logit-normal"):
+        action = policy(family).action(far)
+        assert (action >= LOW).all()
+        assert (action <= HIGH).all()
+
+
+@pytest.mark.parametrize("family", NAMES)
+def test_greedy_actions_are_those_of_the_law_over_actions(family: str) -> None:
+    rows = torch.tensor([[0.4, -0.2, 0.1, -0.6]], dtype=torch.float64)  # outputs of two action dimensions
+    bound = policy(family)
+    law = action_law(family, bound.parameters(rows))
+    assert ("median" in bound.family.greedy) == (family != "beta")
+    for by in bound.family.greedy:
+        centre = law.median if family == "gaussian" else getattr(law, by)
+        expected = bound.centre + bound.half_range * centre.numpy()
+        assert np.allclose(bound.greedy(rows, by), expected, atol=1e-12)
+
+
+def test_an_unknown_greedy_action_is_refused_with_the_choices() -> None:
+    with pytest.raises(ValueError, match="beta offers the greedy actions mean, mode, not 'median'"):
+        policy("beta").greedy(torch.zeros(4), "median")
+
+
+@pytest.mark.parametrize("family", NAMES)
+@pytest.mark.parametrize("spread", [-2.0, 0.0, 1.0])
+def test_entropy_and_its_gradient_are_those_of_the_named_law(family: str, spread: float) -> None:
+    p = parameters(family, spread)
+    leaves = [x.clone().requires_grad_() for x in p]
+    ours = FAMILIES[family].entropy(Parameters(*leaves))
+    assert ours.shape == (2,)
+    same = [x.clone().requires_grad_() for x in p]
+    if family == "gaussian":
+        theirs = torch.distributions.Normal(same[0], same[1].exp()).entropy().sum(-1)
+    else:
+        theirs = action_law(family, Parameters(*same)).entropy().sum(-1)
+    tolerance = 1e-3 if family == "logit-normal" else 1e-9
+    assert torch.allclose(ours, theirs, atol=tolerance, rtol=0)
+    ours_gradients = torch.autograd.grad(ours.sum(), leaves, allow_unused=True)
+    their_gradients = torch.autograd.grad(theirs.sum(), same, allow_unused=True)
+    for a, b in zip(ours_gradients, their_gradients, strict=True):
+        zero = torch.zeros_like(p.first)
+        assert torch.allclose(zero if a is None else a, zero if b is None else b, atol=2 * tolerance, rtol=0)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.sampled_from(NAMES), st.floats(0.12, 0.55))
+def test_initial_std_is_the_executed_standard_deviation(family: str, std: float) -> None:
+    """By sampling: draw, map, clip, and measure in units of half the range."""
+    bias = head_bias(PolicyConfig(family, initial_std=std))
+    assert bias is not None
+    bound = policy(family)
+    outputs = np.repeat(np.array(bias), 2)[None]  # [1, 2A]
+    draw = bound.law.sampler([np.random.default_rng(0)], 4000, 2, np.float64)
+    p = bound.parameters(outputs, np)
+    action = np.stack([draw(p, t)[0] for t in range(4000)])
+    executed = np.clip(bound.action(action), LOW, HIGH)
+    measured = np.sqrt((((executed - bound.centre) / bound.half_range) ** 2).mean())
+    assert measured == pytest.approx(std, rel=0.05)
+
+
+def test_executed_std_is_that_of_the_public_distributions() -> None:
+    for s in (0.05, 0.5, 2.0):
+        assert executed_std("gaussian", s) == pytest.approx(ClippedNormal(0.0, s).stddev.item(), rel=1e-5)
+        law = LogitNormal(torch.zeros(()).double(), s, -1.0, 1.0)
+        assert executed_std("logit-normal", s) == pytest.approx(law.stddev.item(), rel=1e-9)
+        assert executed_std("beta", 1 + s) == pytest.approx(
+            ScaledBeta(1 + s, 1 + s, -1.0, 1.0).stddev.item(), rel=1e-5
+        )
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        (lambda: PolicyConfig("normal"), "no policy family 'normal'; choose one of gaussian"),
+        (lambda: PolicyConfig("beta", state_dependent_std=False), "no scale"),
+        (lambda: head_bias(PolicyConfig("beta", initial_std=0.7)), "between 0.07"),
+        (lambda: head_bias(PolicyConfig("gaussian", initial_std=1.2)), "out of reach"),
+        (lambda: Policy(PolicyConfig("beta"), LOW, np.array([np.inf, 1.0])), "finite bounds"),
+        (lambda: Policy(PolicyConfig("beta"), HIGH, LOW), "must be below"),
+        (lambda: Policy(PolicyConfig("beta"), LOW[None], HIGH[None]), "one-dimensional Box"),
+    ],
+)
+def test_bad_input_gets_an_error_that_names_the_fix(config, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        config()

@@ -1,0 +1,253 @@
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, checkpoint, preset, train
+from tests.learning.point import PointEnv
+from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
+
+
+def same_records(a: list[dict], b: list[dict], rows: slice | list[int] = slice(None)) -> bool:
+    """Whether two runs' records agree bitwise (NaN equals NaN), wall time apart."""
+    timeless = [key for key in a[0] if key != "seconds"]
+    return all(
+        np.array_equal(np.atleast_1d(x[key])[rows], np.atleast_1d(y[key])[rows], equal_nan=True)
+        if np.ndim(x[key])
+        else x[key] == y[key]
+        for x, y in zip(a, b, strict=True)
+        for key in timeless
+    )
+
+
+# ---- a seed's run is its own
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_poisoned_seed_harms_no_other(algo: str, family: str) -> None:
+    healthy = small_run(small_config(algo, family))
+    with pytest.warns(DivergedSeedWarning, match=r"seeds \[1\] diverged in epoch 0"):
+        poisoned = small_run(small_config(algo, family), poisoned=(1,))
+    assert torch.equal(weights(healthy)[[0, 2]], weights(poisoned)[[0, 2]])
+    assert same_records(healthy.records, poisoned.records, [0, 2])
+    assert poisoned.records[-1]["diverged"].tolist() == [False, True, False]
+    assert np.isnan(poisoned.records[-1]["kl"][1])
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+@pytest.mark.parametrize("family", ["logit-normal", "beta"])
+def test_a_seed_does_not_see_its_neighbours_nor_its_row(algo: str, family: str) -> None:
+    """Bitwise with other seeds beside it, in another row, and among ten."""
+    runs = [
+        weights(small_run(small_config(algo, family, seeds=s)))
+        for s in ((0, 1, 2), (1, 8, 9), tuple(range(10)))
+    ]
+    assert torch.equal(runs[0][1], runs[1][0])
+    assert torch.equal(runs[0], runs[2][:3])
+    assert not torch.equal(runs[0][0], runs[0][1])
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_seed_alone_is_the_same_up_to_rounding(algo: str, dtype: str) -> None:
+    """One row takes another path through the matrix library: equal to a few units in the last place."""
+    together = weights(small_run(small_config(algo, "logit-normal", dtype=dtype)))
+    alone = weights(small_run(small_config(algo, "logit-normal", dtype=dtype, seeds=(1,))))
+    tolerance = {"float32": 1e-5, "float64": 1e-13}[dtype]
+    assert torch.allclose(alone[0], together[1], rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+def test_one_configuration_gives_one_result_whatever_the_threads(algo: str) -> None:
+    before = torch.get_num_threads()
+    runs = []
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        runs.append(small_run(small_config(algo, "logit-normal")))
+        assert torch.get_num_threads() == threads
+    torch.set_num_threads(before)
+    assert torch.equal(*map(weights, runs))
+    assert same_records(runs[0].records, runs[1].records)
+
+
+# ---- checkpoints
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_resumed_run_is_the_uninterrupted_run(algo: str, family: str, tmp_path: Path) -> None:
+    config = small_config(algo, family, epochs=4)
+    whole = train(config, make_envs=PointEnv)
+    train(dataclasses.replace(config, epochs=2), run_dir=tmp_path, make_envs=PointEnv)
+    resumed = train(config, run_dir=tmp_path, make_envs=PointEnv)
+    assert torch.equal(weights(whole), weights(resumed))
+    assert same_records(whole.records, resumed.records)
+
+
+def test_on_robots_too(tmp_path: Path) -> None:
+    """Physics state included: contacts, clocks, generators; truncation falls into the resumed part."""
+    config = dataclasses.replace(small_config(horizon=384, seeds=2, epochs=3), env="Hopper-v5")
+    whole = train(config)
+    train(dataclasses.replace(config, epochs=1), run_dir=tmp_path)
+    resumed = train(config, run_dir=tmp_path)
+    assert torch.equal(weights(whole), weights(resumed))
+    assert same_records(whole.records, resumed.records)
+
+
+def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:
+    config = small_config(epochs=4)
+
+    def forgetful(n: int) -> PointEnv:
+        return PointEnv(n, saves=False)
+
+    train(dataclasses.replace(config, epochs=2), run_dir=tmp_path, make_envs=forgetful)
+    resumed = train(config, run_dir=tmp_path, make_envs=forgetful)
+    assert len(resumed.records) == 4
+    whole = train(config, make_envs=forgetful)
+    assert same_records(whole.records[:2], resumed.records[:2])
+    assert not torch.equal(weights(whole), weights(resumed))
+
+
+KILLED = """
+    import sys, time
+    from inbounds.learning import train
+    from tests.learning.point import PointEnv
+    from tests.learning.small import small_config
+
+    class Stuck(PointEnv):
+        steps = 0
+
+        def step(self, actions):
+            self.steps += 1
+            if self.steps == 2 * 128 + 50:
+                print("in the middle of the third epoch", flush=True)
+                time.sleep(60)
+            return super().step(actions)
+
+    config = small_config(epochs=4)
+    train(config.__class__(**{**vars(config), "checkpoint_every": 1}), run_dir=sys.argv[1], make_envs=Stuck)
+"""
+
+
+def test_a_run_killed_in_mid_epoch_goes_on_as_if_nothing_had_happened(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path)]
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root) as process:
+        assert process.stdout is not None
+        assert "middle" in process.stdout.readline()
+        os.kill(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    config = dataclasses.replace(small_config(epochs=4), checkpoint_every=1)
+    assert len(checkpoint.load(tmp_path / checkpoint.FILE_NAME)["records"]) == 2
+    resumed = train(config, run_dir=tmp_path, make_envs=PointEnv)
+    whole = train(config, make_envs=PointEnv)
+    assert torch.equal(weights(whole), weights(resumed))
+    assert same_records(whole.records, resumed.records)
+
+
+def test_a_checkpoint_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / checkpoint.FILE_NAME
+    checkpoint.save(path, {"epoch": 1, "array": np.arange(3.0)})
+
+    def dies(state: object, file: object) -> None:
+        file.write(b"half a checkpo")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(torch, "save", dies)
+    with pytest.raises(OSError, match="disk full"):
+        checkpoint.save(path, {"epoch": 2, "array": np.arange(3.0)})
+    state = checkpoint.load(path)
+    assert state["epoch"] == 1
+    assert np.array_equal(state["array"], np.arange(3.0))
+
+
+def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:
+    config = small_config(epochs=1)
+    train(config, run_dir=tmp_path, make_envs=PointEnv)
+    other = dataclasses.replace(config, normalize_obs=False)
+    with pytest.raises(ValueError, match="normalize_obs: True → False"):
+        train(other, run_dir=tmp_path, make_envs=PointEnv)
+
+
+# ---- records, divergence, configuration
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+def test_records_say_what_happened(algo: str) -> None:
+    seen = []
+    config = small_config(algo, epochs=2)
+    run = train(config, make_envs=PointEnv, callback=lambda trainer, record: seen.append(record))
+    assert seen == run.records
+    first, second = run.records
+    assert (first["env_steps"], second["env_steps"], second["epoch"]) == (128, 256, 1)
+    assert (first["episodes"] >= 6).all()  # 20 steps each, or fewer
+    names = {"return_mean", "kl", "entropy", "saturation", "action_std", "explained_variance", "diverged"}
+    names |= {"ppo": {"clip_fraction"}, "trpo": {"accepted", "step_fraction"}}.get(algo, set())
+    assert names <= first.keys()
+    assert all(np.isfinite(second[name]).all() for name in names)
+
+
+def test_when_every_seed_has_diverged_training_stops() -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = train(small_config(epochs=5), make_envs=lambda n: PointEnv(n, poisoned=(0, 1, 2)))
+    assert [w.category for w in caught] == [DivergedSeedWarning]
+    assert len(run.records) == 1
+    assert run.diverged.all()
+
+
+def test_an_exploding_seed_is_marked_when_it_explodes() -> None:
+    trainer = Trainer(small_config(), PointEnv)
+    trainer.epoch()
+    trainer.networks.critic.theta[2, 5] = torch.inf
+    with pytest.warns(DivergedSeedWarning, match=r"\[2\] diverged in epoch 1"):
+        trainer.epoch()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        record = trainer.epoch()  # reported once
+    assert record["diverged"].tolist() == [False, False, True]
+
+
+def test_presets_are_the_table() -> None:
+    common, printed = (preset(name) for name in ("common", "as-printed"))
+    for config in (common, printed):
+        a = config.algorithm
+        assert (a.horizon, a.learning_rate, a.num_epochs, a.minibatch_size) == (2048, 3e-4, 10, 64)
+        assert (a.gamma, a.gae_lambda, a.entropy_coef) == (0.99, 0.95, 1e-4)
+        assert config.policy.state_dependent_std
+        assert config.network.dtype == "float32"
+    a, b = common.algorithm, printed.algorithm
+    assert (a.clip_range, a.normalize_advantage, a.max_grad_norm, a.adam_eps) == (0.2, True, 0.5, 1e-5)
+    assert (b.clip_range, b.normalize_advantage, b.max_grad_norm, b.adam_eps) == (0.02, False, None, 1e-8)
+    assert (common.normalize_obs, common.network.initialization) == (True, "orthogonal")
+    assert (printed.normalize_obs, printed.network.initialization) == (False, "pytorch")
+    assert (common.network.policy_head_gain, common.network.value_head_gain) == (0.01, 1.0)
+    trpo = preset("as-printed", algo="trpo").algorithm
+    assert (trpo.max_kl, trpo.cg_iters, trpo.damping) == (0.01, 10, 0.1)
+    assert (trpo.backtrack_coef, trpo.max_backtracks) == (0.5, 10)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: preset("commom"), "choose common or as-printed"),
+        (lambda: preset("common", algo="sac"), "choose one of ppo, trpo"),
+        (lambda: preset("common", policy="normal"), "choose one of gaussian"),
+        (lambda: TrainConfig(seeds=()), "seeds must be different"),
+        (lambda: TrainConfig(seeds=(1, 1)), "seeds must be different"),
+        (lambda: TrainConfig(epochs=0), "epochs must be positive"),
+        (lambda: TrainConfig(action_mode="clipped"), "clip or raw"),
+    ],
+)
+def test_bad_configurations_are_refused(wrong, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        wrong()
