@@ -12,6 +12,24 @@ ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
+ANATOMY = (
+    "## Objectives",
+    "{admonition} Predict",
+    "{prf:",
+    "**Check it",
+    "## Build it",
+    "## Run it",
+    "**negative result**",
+    "## Pitfalls",
+    "## Exercises",
+    "{exercise-start}",
+    "{solution-start}",
+    "{admonition} In class",
+    "## Summary",
+    "{cite",
+)
+
+
 def code_cells(notebook: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
