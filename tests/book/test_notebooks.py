@@ -66,16 +66,7 @@ def test_anatomy(path: Path) -> None:
     prose = "\n".join(
         cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown"
     )
-    for part in (
-        "## Objectives",
-        "{prf:",
-        "{exercise}",
-        "{solution",
-        "## Pitfalls",
-        "In class",
-        "## Summary",
-        "{cite}",
-    ):
+    for part in ANATOMY:
         assert part in prose, part
 
 
