@@ -188,8 +188,11 @@ class BetaLaw:
         return draw
 
     def log_prob(self, parameters: Parameters, latent: Tensor) -> Tensor:
-        """Return Σ_A (α − 1) log x + (β − 1) log(1 − x) − log B(α, β), `[...]`."""
-        return scaled_beta(parameters, low=0.0).log_prob(latent).sum(-1)
+        """Return Σ_A (α − 1) log x + (β − 1) log(1 − x) − log B(α, β), `[...]`: `ScaledBeta`'s, at half its cost."""
+        alpha, beta = parameters.first.double(), parameters.second.double()
+        x = latent.double()
+        shape = (alpha - 1) * torch.log(x) + (beta - 1) * torch.log1p(-x)
+        return (shape - log_beta(alpha, beta)).sum(-1).to(latent.dtype)
 
     def kl(self, old: Parameters, new: Parameters) -> Tensor:
         """Return KL(old‖new) in closed form, `[...]`."""
@@ -201,13 +204,18 @@ CLIPPED_NORMAL = ClippedNormalLaw()
 BETA = BetaLaw()
 
 
+def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
+    """Return log B(α, β), `[...]`, for float64 α and β."""
+    return torch.lgamma(alpha) + torch.lgamma(beta) - torch.lgamma(alpha + beta)
+
+
 def clipped_normal(parameters: Parameters) -> ClippedNormal:
     """Return the law of the unit action min(max(z, −1), 1), elementwise `[..., A]`."""
     return ClippedNormal(parameters.first, parameters.second.exp(), -1.0, 1.0, validate_args=False)
 
 
 def scaled_beta(parameters: Parameters, low: float = -1.0) -> ScaledBeta:
-    """Return the Beta on [low, 1], elementwise `[..., A]`: the unit action (low = −1) or the latent (low = 0)."""
+    """Return the Beta on [low, 1], elementwise `[..., A]`: of the unit action (low = −1) or the latent (low = 0)."""
     return ScaledBeta(parameters.first, parameters.second, low, 1.0, validate_args=False)
 
 

@@ -56,7 +56,7 @@ def minibatches(
     index = torch.from_numpy(order.reshape(num_seeds, -1, minibatch_size).swapaxes(0, 1).copy())  # [N, S, B]
 
     def gather(x: Tensor) -> Tensor:  # [S, T, ...] → [N, S, B, ...]
-        return x.flatten(0, 1)[index.flatten()].unflatten(0, index.shape)
+        return x.flatten(0, 1).index_select(0, index.flatten()).unflatten(0, index.shape)
 
     advantages = gather(advantage)
     if normalize:

@@ -16,6 +16,7 @@ constant log of half its range, which no gradient sees.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -26,7 +27,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from torch.nn.functional import softplus
+from torch.autograd.function import once_differentiable
 
 from inbounds.distributions import LogitNormal, trapezoid
 from inbounds.learning import laws
@@ -62,18 +63,65 @@ def normal_entropy(parameters: Parameters) -> Tensor:
 
 
 def logit_normal_entropy(parameters: Parameters) -> Tensor:
-    """Return the entropy `[...]` of the unit action tanh(z/2), in nats: the Normal's and the map's expected slope.
+    """Return the entropy `[...]` of the unit action tanh(z/2), in nats: the Normal's plus the map's expected log-slope.
 
-    E[log ½(1 − tanh²(z/2))] = log 2 + μ − 2 E[softplus(z)], by 15 nodes: within 1e-3 nats of `LogitNormal.entropy`
-    for every log σ ≤ 1, at a tenth of its cost. A bonus is multiplied by 1e-4.
+    Within 1e-3 nats of `LogitNormal.entropy` for every log σ ≤ 1, at a twentieth of its cost: a bonus, which is
+    multiplied by 1e-4, need not be exact to the last bit. Differentiable once.
     """
-    loc, log_scale = parameters
-    nodes, weights = trapezoid(15, 5.0, loc.dtype)
-    z = torch.addcmul(
-        loc, log_scale.exp(), nodes.view(-1, *(1,) * loc.dim())
-    )  # [N, ..., A]: long inner loops
-    expected_softplus = (weights @ softplus(z).flatten(1)).view_as(loc)
-    return normal_entropy(parameters) + (math.log(2) + loc - 2 * expected_softplus).sum(-1)
+    log_slope: Tensor = _ExpectedLogSlope.apply(*parameters)
+    return normal_entropy(parameters) + log_slope.sum(-1)
+
+
+class _ExpectedLogSlope(torch.autograd.Function):
+    """E[log ½(1 − tanh²(z/2))] for z ~ Normal, elementwise: by 15 nodes, its gradient by the same nodes.
+
+    With log ½(1 − tanh²(z/2)) = log 2 − 2 (|z|/2 + log(1 + exp(−|z|))) and its derivative −tanh(z/2). NumPy and long inner
+    loops, because PPO evaluates it in every minibatch.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, loc: Tensor, log_scale: Tensor) -> Tensor:
+        nodes, weights = _nodes_and_weights(loc.dtype)
+        scale = np.exp(log_scale.numpy()).ravel()
+        half = (
+            nodes[:, None] * scale
+        )  # [N, M], soon z/2; in place, because fresh memory costs more than arithmetic
+        half += loc.numpy().ravel()
+        half *= 0.5
+        slope = np.tanh(half)
+        np.abs(half, out=half)
+        bend = np.exp(-2 * half)
+        bend += 1
+        np.log(bend, out=bend)
+        bend += half
+        log_slope = math.log(2) - 2 * (weights @ bend)
+        to_loc, to_log_scale = -weights @ slope, -(weights * nodes) @ slope * scale
+        ctx.save_for_backward(*(torch.from_numpy(g).view(loc.shape) for g in (to_loc, to_log_scale)))
+        return torch.from_numpy(log_slope).view(loc.shape)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor, Tensor]:
+        to_loc, to_log_scale = ctx.saved_tensors
+        return grads[0] * to_loc, grads[0] * to_log_scale
+
+
+@functools.cache
+def _nodes_and_weights(dtype: torch.dtype) -> tuple[NDArray[Any], NDArray[Any]]:
+    nodes, weights = trapezoid(15, 5.0, dtype)
+    return nodes.numpy(), weights.numpy()
+
+
+def beta_entropy(parameters: Parameters) -> Tensor:
+    """Return the entropy `[...]` of the unit action 2x − 1, in nats: `ScaledBeta.entropy` at half its cost."""
+    alpha, beta = parameters.first.double(), parameters.second.double()
+    digammas = (
+        (alpha - 1) * torch.digamma(alpha)
+        + (beta - 1) * torch.digamma(beta)
+        - (alpha + beta - 2) * torch.digamma(alpha + beta)
+    )
+    entropy = laws.log_beta(alpha, beta) - digammas + math.log(2)
+    return entropy.sum(-1).to(parameters.first.dtype)
 
 
 def _logit_normal(parameters: Parameters) -> LogitNormal:
@@ -104,7 +152,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
             law=BETA,
             to_unit=lambda latent, xp: 2 * latent - 1,
             entropy_name="differential entropy of the unit action",
-            entropy=lambda p: laws.scaled_beta(p).entropy().sum(-1),
+            entropy=beta_entropy,
             greedy={
                 "mean": lambda p: laws.scaled_beta(p).mean,
                 "mode": lambda p: laws.scaled_beta(p).mode,

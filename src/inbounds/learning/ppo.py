@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import mse_loss
 
 from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.checks import check, check_minibatches
@@ -102,11 +103,12 @@ def loss(networks: ActorCritic, batch: Minibatch, config: PPOConfig) -> Tensor:
     policy = networks.policy
     parameters = networks.parameters(batch.obs)
     log_prob = policy.law.log_prob(parameters, batch.latent)
-    objective = clipped_surrogate(log_prob, batch.log_prob, batch.advantage, config.clip_range)
-    objective = objective - config.value_coef * (networks.values(batch.obs) - batch.return_).square()
+    surrogate = clipped_surrogate(log_prob, batch.log_prob, batch.advantage, config.clip_range)
+    error = mse_loss(networks.values(batch.obs), batch.return_, reduction="sum")
+    total = config.value_coef * error - surrogate.sum()
     if config.entropy_coef:
-        objective = objective + config.entropy_coef * policy.family.entropy(parameters)
-    return -objective.sum() / batch.obs.shape[1]
+        total = total - config.entropy_coef * policy.family.entropy(parameters).sum()
+    return total / batch.obs.shape[1]
 
 
 def update(

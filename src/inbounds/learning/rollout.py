@@ -115,9 +115,8 @@ class Collector:
 
     def restart(self) -> None:
         """Start new episodes everywhere, from each seed's own environment seed."""
-        seeds: Any = [
-            stream.environment for stream in self.streams
-        ]  # a list is fine, whatever VectorEnv declares
+        # Any: VectorEnv declares an integer, every vector environment takes a list.
+        seeds: Any = [stream.environment for stream in self.streams]
         obs, _ = self.envs.reset(seed=seeds)
         self.obs = self._see(obs)
         self.returns[:] = 0

@@ -1,0 +1,284 @@
+"""What a run leaves on disk, beside the checkpoint it goes on from: learning curves and policies.
+
+`curves.parquet` has one row per epoch and seed; `COLUMNS` is its schema. `policies.safetensors` has the weights of
+every seed's policy network, the statistics its observations are normalised by, and the box of its actions. Both carry
+the run's whole configuration as JSON, hold no code (nothing is unpickled), are written whole or not at all, and have
+checksums, so that damage is noticed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import safetensors
+import safetensors.numpy
+from numpy.typing import NDArray
+
+from inbounds.learning import checkpoint
+from inbounds.learning.config import TrainConfig
+from inbounds.learning.run_files import (
+    METADATA_KEY,
+    config_from,
+    damaged,
+    find,
+    metadata_of,
+    write_whole,
+)
+from inbounds.learning.trained_policy import TrainedPolicy
+from inbounds.learning.training import Record, Trainer
+
+CHECKPOINT_FILE = checkpoint.FILE_NAME
+CURVES_FILE = "curves.parquet"
+POLICIES_FILE = "policies.safetensors"
+
+COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {
+    "epoch": (pa.int32(), "0, 1, …: rollouts, each followed by one update"),
+    "env_steps": (pa.int64(), "steps of this seed's environment up to the end of the epoch"),
+    "seed": (pa.int64(), "the seed, as the configuration names it"),
+    "seconds": (pa.float64(), "wall time of the epoch, all seeds together [s]"),
+    "episodes": (pa.int32(), "episodes that ended within the epoch"),
+    "return_mean": (pa.float64(), "mean undiscounted return of those episodes; NaN where none ended"),
+    "saturation": (pa.float64(), "fraction of executed action components within 0.1 % of a bound"),
+    "action_std": (pa.float64(), "standard deviation of the executed actions, in units of half the range"),
+    "kl": (pa.float64(), "mean exact KL(old‖new) of the update [nats]"),
+    "approx_kl": (pa.float64(), "its estimate from the drawn latents [nats]"),
+    "entropy": (
+        pa.float64(),
+        "mean entropy of the policy after the update, the one of the family's bonus [nats]",
+    ),
+    "explained_variance": (pa.float64(), "of the returns by the values before the update"),
+    "clip_fraction": (pa.float64(), "PPO: fraction of steps whose ratio ended beyond 1 ± ε"),
+    "accepted": (pa.float64(), "TRPO: 1 where the line search accepted a step, else 0"),
+    "step_fraction": (pa.float64(), "TRPO: accepted length, as a fraction of the full step"),
+    "diverged": (pa.bool_(), "the seed's weights are not finite: leave it out of means"),
+}
+"""Column → type and meaning, in order; a run has those that its algorithm records."""
+
+
+def save_run(run_dir: str | Path, trainer: Trainer) -> None:
+    """Write the curves and the policies of a run as it stands.
+
+    Args:
+        run_dir: the folder; it must exist.
+        trainer: the run, with at least one epoch done.
+    """
+    write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
+    save_policies(Path(run_dir) / POLICIES_FILE, trainer)
+
+
+# ---- learning curves
+
+
+def write_curves(path: str | Path, config: TrainConfig, records: Sequence[Record]) -> None:
+    """Write records as a Parquet table, one row per epoch × seed, epoch by epoch.
+
+    Floats are stored without loss, their bytes split into streams and compressed by zstd. The schema carries the
+    meaning of each column, and the configuration under the key `inbounds`.
+
+    Args:
+        path: of the file; its folder must exist.
+        config: of the run.
+        records: of at least one epoch.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.learning import preset, train
+        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     write_curves(f"{folder}/curves.parquet", run.config, run.records)
+        ...     read_curves(folder).select(["epoch", "seed", "env_steps"]).to_pylist()
+        [{'epoch': 0, 'seed': 0, 'env_steps': 2048}, {'epoch': 0, 'seed': 1, 'env_steps': 2048}]
+    """
+    num_seeds = len(config.seeds)
+    known = [name for name in COLUMNS if name in records[0] or name == "seed"]
+    fields, arrays, encodings = [], [], {}
+    for name in [*known, *sorted(records[0].keys() - COLUMNS.keys())]:
+        kind, meaning = COLUMNS.get(name, (pa.float64(), ""))
+        per_epoch = [config.seeds] * len(records) if name == "seed" else [record[name] for record in records]
+        values = np.concatenate([np.broadcast_to(value, num_seeds) for value in per_epoch])
+        fields.append(pa.field(name, kind, nullable=False, metadata={"meaning": meaning}))
+        arrays.append(pa.array(values, kind, from_pandas=False))
+        if not pa.types.is_boolean(kind):
+            encodings[name] = "BYTE_STREAM_SPLIT" if pa.types.is_floating(kind) else "DELTA_BINARY_PACKED"
+    schema = pa.schema(fields, metadata={METADATA_KEY: metadata_of(config)})
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        pa.Table.from_arrays(arrays, schema=schema),
+        sink,
+        compression="zstd",
+        use_dictionary=False,
+        column_encoding=encodings,
+        write_page_checksum=True,
+    )
+    write_whole(Path(path), sink.getvalue())
+
+
+def read_curves(run: str | Path) -> pa.Table:
+    """Read learning curves; `config_of` gives the configuration that they belong to.
+
+    Args:
+        run: run directory, or the Parquet file itself.
+
+    Returns:
+        The table, with the columns of `COLUMNS` that the algorithm records.
+
+    Raises:
+        FileNotFoundError: there are none.
+        DamagedFileError: the file is damaged.
+    """
+    path = find(run, CURVES_FILE)
+    try:
+        return pq.read_table(path, page_checksum_verification=True)
+    except (pa.ArrowException, OSError) as error:
+        raise damaged(path, error) from error
+
+
+def config_of(curves: pa.Table) -> TrainConfig:
+    """Return the configuration of the run that curves from `read_curves` belong to."""
+    return config_from(json.loads(curves.schema.metadata[METADATA_KEY.encode()]))
+
+
+# ---- policies
+
+
+def policies_of(trainer: Trainer) -> list[TrainedPolicy]:
+    """Return the policies of a run as it stands, one per seed; later training does not change them.
+
+    Args:
+        trainer: the run.
+
+    Example:
+        >>> from inbounds.learning import preset, train
+        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
+        >>> policies_of(run)[1].act(np.zeros(8)).shape
+        (2,)
+    """
+    tensors = _tensors(trainer)
+    return [TrainedPolicy.from_tensors(trainer.config, tensors, i) for i in range(len(trainer.config.seeds))]
+
+
+def save_policies(path: str | Path, trainer: Trainer) -> None:
+    """Write the policies of all seeds of a run to a safetensors file.
+
+    Tensors (S seeds in the order of the configuration): `policy.i.weight` `[S, out, in]`, `policy.i.bias` `[S, out]`,
+    `normalizer.mean` and `normalizer.variance` `[S, O]` where the run normalises observations, `action.low` and
+    `action.high` `[A]`, `diverged` `[S]`.
+
+    Args:
+        path: of the file; its folder must exist.
+        trainer: the run.
+    """
+    tensors = _tensors(trainer)
+    metadata = metadata_of(trainer.config, sha256=_digest(tensors))
+    write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
+
+
+def load_policies(run: str | Path) -> list[TrainedPolicy]:
+    """Load the policies of all seeds of a run.
+
+    Args:
+        run: run directory, or the safetensors file itself.
+
+    Raises:
+        FileNotFoundError: there are none.
+        DamagedFileError: the file is damaged.
+    """
+    path = find(run, POLICIES_FILE)
+    try:
+        with safetensors.safe_open(path, "np") as file:
+            metadata = json.loads((file.metadata() or {})[METADATA_KEY])
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no dictionary)
+    except (safetensors.SafetensorError, OSError, KeyError, ValueError) as error:
+        raise damaged(path, error) from error
+    if metadata.get("sha256") != _digest(tensors):
+        raise damaged(path, "its checksum is wrong")
+    config = config_from(metadata)
+    return [TrainedPolicy.from_tensors(config, tensors, i) for i in range(len(config.seeds))]
+
+
+def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
+    """Load the policy of one seed of a run.
+
+    Args:
+        run: run directory, or the safetensors file itself.
+        seed_index: which, 0 the first of the run.
+
+    Returns:
+        The policy; `act` takes and returns NumPy arrays.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        DamagedFileError: the file is damaged.
+        IndexError: the run has fewer seeds.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.learning import preset, train
+        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_run(folder, run)
+        ...     policy = load_policy(folder, seed_index=1)
+        >>> policy.act(np.zeros(8), greedy="median").shape, policy.seed
+        ((2,), 1)
+    """
+    policies = load_policies(run)
+    if not 0 <= seed_index < len(policies):
+        raise IndexError(
+            f"the run has {len(policies)} seeds: choose a seed index from 0 to {len(policies) - 1}"
+        )
+    return policies[seed_index]
+
+
+def _tensors(trainer: Trainer) -> dict[str, NDArray[Any]]:
+    space = trainer.envs.single_action_space
+    weights = trainer.networks.actor.named_tensors("policy")
+    tensors = {name: tensor.numpy() for name, tensor in weights.items()}
+    if (normalizer := trainer.collector.normalizer) is not None:
+        tensors["normalizer.mean"] = normalizer.mean.copy()
+        tensors["normalizer.variance"] = normalizer.squares / max(normalizer.count, 1)
+    return tensors | {
+        "action.low": space.low.copy(),  # type: ignore[attr-defined]  # a Trainer has seen to it that it is a Box
+        "action.high": space.high.copy(),  # type: ignore[attr-defined]
+        "diverged": trainer.diverged.copy(),
+    }
+
+
+def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        digest.update(name.encode() + np.ascontiguousarray(tensors[name]).tobytes())
+    return digest.hexdigest()
+
+
+# ---- checkpoints
+
+
+def load_checkpoint(run_dir: str | Path) -> dict[str, Any]:
+    """Load a run's checkpoint.
+
+    Args:
+        run_dir: the run directory.
+
+    Raises:
+        FileNotFoundError: there is none.
+        DamagedFileError: it is damaged.
+    """
+    path = find(run_dir, CHECKPOINT_FILE)
+    remedy = (
+        f"move {path.parent} out of the way and train again, or put a copy of the checkpoint in its place. "
+        "Nothing has been changed"
+    )
+    try:
+        state = checkpoint.load(path)
+    except Exception as error:  # torch raises whatever the damage makes it stumble over
+        raise damaged(path, error, remedy) from error
+    if not isinstance(state, dict) or not {"config", "networks", "records"} <= state.keys():
+        raise damaged(path, "it holds no run", remedy)
+    return state

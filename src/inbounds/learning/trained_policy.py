@@ -1,0 +1,132 @@
+"""A policy after training: observations in, actions out, in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from inbounds.learning.config import TrainConfig
+from inbounds.learning.networks import Mlp
+from inbounds.learning.normalize import RunningNormalizer
+from inbounds.learning.policies import Policy
+
+
+class TrainedPolicy:
+    """The policy of one seed, frozen: its network, the statistics of its observations, its box.
+
+    Args:
+        config: of the run.
+        seed: which of the run's seeds.
+        diverged: whether its weights are not finite.
+        network: of one seed.
+        normalizer: of one seed; None where the run does not normalise observations.
+        low: `[A]` lower bounds of the action, in the robot's units.
+        high: `[A]` upper bounds.
+    """
+
+    def __init__(
+        self,
+        config: TrainConfig,
+        seed: int,
+        diverged: bool,
+        network: Mlp,
+        normalizer: RunningNormalizer | None,
+        low: NDArray[Any],
+        high: NDArray[Any],
+    ) -> None:
+        self.config, self.seed, self.diverged = config, seed, diverged
+        self.low, self.high = low, high
+        self._network, self._normalizer = network, normalizer
+        self._policy = Policy(config.policy, low, high)
+        self._dtype = np.dtype(config.network.dtype)
+
+    @classmethod
+    def from_tensors(
+        cls, config: TrainConfig, tensors: Mapping[str, NDArray[Any]], index: int
+    ) -> TrainedPolicy:
+        """Take one seed out of the tensors of a run (`inbounds.learning.run_store.save_policies` names them).
+
+        Args:
+            config: of the run.
+            tensors: by name, S in front.
+            index: which seed, 0 the first of the run.
+        """
+        depth = len(config.network.hidden_sizes) + 1
+        weights = [tensors[f"policy.{i}.weight"][index] for i in range(depth)]  # [out, in] each
+        sizes = (weights[0].shape[1], *(weight.shape[0] for weight in weights))
+        network = Mlp(1, sizes, getattr(torch, config.network.dtype))
+        with torch.no_grad():
+            for i, (layer, weight) in enumerate(zip(network.layers, weights, strict=True)):
+                layer.weight[0] = torch.from_numpy(weight)
+                layer.bias[0, :, 0] = torch.from_numpy(tensors[f"policy.{i}.bias"][index])
+        normalizer = None
+        if config.normalize_obs:
+            normalizer = RunningNormalizer(1, sizes[0], config.network.dtype)
+            normalizer.count = 1  # a variance is a mean of squares already
+            normalizer.mean[0] = tensors["normalizer.mean"][index]
+            normalizer.squares[0] = tensors["normalizer.variance"][index]
+        low, high = tensors["action.low"], tensors["action.high"]
+        return cls(
+            config, config.seeds[index], bool(tensors["diverged"][index]), network, normalizer, low, high
+        )
+
+    def __repr__(self) -> str:
+        what = (
+            f"{self.config.policy.family}, {self.config.algorithm_name}, {self.config.env}, seed {self.seed}"
+        )
+        return f"<TrainedPolicy: {what}{', diverged' if self.diverged else ''}>"
+
+    @property
+    def greedy_choices(self) -> tuple[str, ...]:
+        """Ways to act: what the family offers of mean, median and mode, and sample."""
+        return (*self._policy.family.greedy, "sample")
+
+    @property
+    def default_greedy(self) -> str:
+        """The median, the one greedy action that a change of variables leaves alone; the mean where there is none."""
+        return "median" if "median" in self.greedy_choices else "mean"
+
+    def act(
+        self, obs: NDArray[Any], greedy: str | None = None, rng: np.random.Generator | None = None
+    ) -> NDArray[Any]:
+        """Return actions for observations, both as the environment has them.
+
+        Args:
+            obs: `[O]` or `[B, O]`.
+            greedy: "mean", "median", "mode" or "sample", of `greedy_choices`; None is `default_greedy`.
+            rng: where "sample" draws from; None is a generator seeded by the system.
+
+        Returns:
+            `[A]` or `[B, A]`, in the robot's units, within the box (a sample under `action_mode="raw"` may leave it).
+
+        Raises:
+            ValueError: observations of another size, or a greedy action that the family does not offer.
+        """
+        obs = np.asarray(obs)
+        if obs.ndim not in (1, 2) or obs.shape[-1] != self._network.sizes[0]:
+            raise ValueError(
+                f"observations must have the shape [{self._network.sizes[0]}] or [B, {self._network.sizes[0]}], "
+                f"got {list(obs.shape)}"
+            )
+        batch = np.atleast_2d(obs)  # [B, O]
+        seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
+        outputs = self._network.act(seen)  # [B, 2A]: the weights of one seed serve every row
+        way = greedy or self.default_greedy
+        if way == "sample":
+            action = self._sample(outputs, np.random.default_rng() if rng is None else rng)
+        elif way in self.greedy_choices:
+            action = self._policy.greedy(torch.from_numpy(outputs), way)
+        else:
+            raise ValueError(
+                f"{self.config.policy.family} does not act by {way!r}: choose one of {', '.join(self.greedy_choices)}"
+            )
+        return action.astype(self.low.dtype).reshape(*obs.shape[:-1], -1)
+
+    def _sample(self, outputs: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
+        draw = self._policy.law.sampler([rng] * len(outputs), 1, self._policy.act_dim, self._dtype)
+        action = self._policy.action(draw(self._policy.parameters(outputs, np), 0))
+        return np.clip(action, self.low, self.high) if self.config.action_mode == "clip" else action
