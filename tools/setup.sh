@@ -56,7 +56,7 @@ install_system_packages() {
 }
 
 # What the stamp must say for the environment to be up to date.
-fingerprint() { { cat pyproject.toml constraints.txt apt.txt tools/setup.sh; .venv/bin/python -VV; pwd; } | sha256sum; }
+fingerprint() { { cat pyproject.toml constraints.txt apt.txt tools/setup.sh; .venv/bin/python -VV; pwd; } | cksum; }
 
 stamp=.venv/.complete
 if [ -x .venv/bin/python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint 2>/dev/null)" ]; then
