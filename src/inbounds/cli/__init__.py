@@ -1,0 +1,68 @@
+"""The command `inbounds`: train, watch, bench.
+
+>>> main(["watch", "no/such/run"])  # what to do instead goes to standard error
+1
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+EXAMPLES = {
+    "train": """\
+  inbounds train HalfCheetah-v5 --policy logit-normal --algo ppo --seeds 10 --epochs 500
+  inbounds train Hopper-v5 --policy beta --preset as-printed --out runs/hopper-beta
+  inbounds train Ant-v5 --algo trpo --algorithm.max-kl 0.02 --policy.initial-std 0.5 --tensorboard
+  inbounds train HalfCheetah-v5 --epochs 1000      (goes on with the first one, to epoch 1000)
+  inbounds train --algo trpo --preset as-printed --help      (the values of that algorithm and preset)""",
+    "watch": """\
+  inbounds watch runs/HalfCheetah-v5-logit-normal-ppo
+  inbounds watch runs/hopper-beta --greedy mode --seed-index 3 --seconds 5 --out hop.mp4""",
+    "bench": """\
+  inbounds bench
+  inbounds bench --help""",
+}
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Args:
+        args: of the command line, without the program's name; None takes `sys.argv`.
+
+    Returns:
+        The exit code: 0, or 1 where something failed, 2 where the command line is wrong, 130 after Ctrl-C.
+    """
+    args = list(sys.argv[1:] if args is None else args)
+    try:
+        return _run(args)
+    except KeyboardInterrupt:
+        print("\nInterrupted.", file=sys.stderr)
+        return 130
+
+
+def _run(args: list[str]) -> int:
+    # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
+    from inbounds.cli import benchmark, options, training, watching
+    from inbounds.cli.errors import CommandError
+
+    try:
+        if args[:1] == ["bench"] and benchmark.find_root():
+            return benchmark.run(args[1:])  # its options are its own
+        command = options.parse(args)
+        if isinstance(command, options.Train):
+            return training.run(command)
+        if isinstance(command, options.Watch):
+            return watching.run(command)
+        return benchmark.run([])
+    except SystemExit as exit_:  # tyro has written its help, or what is wrong
+        if exit_.code == 0:
+            examples = EXAMPLES.get(next(iter(args), ""), "\n".join(EXAMPLES.values()))
+            print(f"\nexamples:\n{examples}")
+        return exit_.code if isinstance(exit_.code, int) else 1
+    except CommandError as error:
+        print(f"inbounds: {error}", file=sys.stderr)
+        return error.exit_code

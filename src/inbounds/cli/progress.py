@@ -1,0 +1,116 @@
+"""How training goes, while it goes: a live bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections import deque
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from inbounds.learning import Trainer
+from inbounds.learning.training import Record
+
+SECONDS_BETWEEN_LINES = 1.0
+
+
+class TrainingProgress:
+    """A callback for `inbounds.learning.train` that shows each epoch; use it as a context manager.
+
+    The return is the mean over seeds of each seed's last known mean, ± the standard deviation over seeds. Diverged
+    seeds are counted, and left out of every number. Warnings appear as lines above the bar.
+
+    Args:
+        epochs: at which the run ends.
+        console: where to write; by default standard output.
+
+    Example:
+        >>> from inbounds.learning import preset, train
+        >>> with TrainingProgress(epochs=1) as progress:
+        ...     run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1), callback=progress)
+        epoch 1/1  return ... ± ...  KL ...  saturation ... %  ... steps/s  0:00 left
+    """
+
+    def __init__(self, epochs: int, console: Console | None = None) -> None:
+        self.epochs = epochs
+        self.console = console or Console(soft_wrap=True, highlight=False)
+        self._returns: Any = None  # [S], of each seed the last one known
+        self._recent: deque[tuple[float, int]] = deque(maxlen=20)  # (time, env steps of all seeds)
+        self._last_line = -np.inf
+        columns = (TextColumn("{task.description}"), BarColumn(bar_width=None))
+        self._bar = Progress(
+            *columns, console=self.console, expand=True, disable=not self.console.is_terminal
+        )
+        self._task = self._bar.add_task(f"epoch 0/{epochs}", total=epochs)
+
+    def __enter__(self) -> Self:
+        self._warnings = warnings.catch_warnings()
+        self._warnings.__enter__()
+        warnings.showwarning = lambda message, *_args, **_kwargs: self.say(f"warning: {message}")
+        self._recent.append((time.perf_counter(), 0))
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+        self._warnings.__exit__(kind, error, trace)
+
+    def __call__(self, trainer: Trainer, record: Record) -> None:
+        """Show an epoch."""
+        now, done = time.perf_counter(), len(trainer.records)
+        horizon = trainer.config.algorithm.horizon
+        self._recent.append((now, self._recent[-1][1] + horizon * len(trainer.config.seeds)))
+        self._remember_returns(trainer)
+        text = self._describe(record, done)
+        self._bar.update(self._task, completed=done, description=text)
+        is_due = now - self._last_line >= SECONDS_BETWEEN_LINES or done >= self.epochs
+        if not self.console.is_terminal and is_due:
+            self.say(text)
+            self._last_line = now
+
+    def say(self, text: str) -> None:
+        """Write a line, above the bar."""
+        self.console.print(text, markup=False)
+
+    def _remember_returns(self, trainer: Trainer) -> None:
+        """Take in the returns of the last epoch; at first, of all epochs that a resumed run has behind it."""
+        records = trainer.records if self._returns is None else trainer.records[-1:]
+        for record in records:
+            new = record["return_mean"]
+            self._returns = new if self._returns is None else np.where(np.isnan(new), self._returns, new)
+
+    def _describe(self, record: Record, done: int) -> str:
+        """One line about one epoch."""
+        healthy = ~record["diverged"]
+        returns = self._returns[healthy & np.isfinite(self._returns)]
+        spread = f" ± {returns.std(ddof=1):.1f}" if len(returns) > 1 else ""
+        (then, steps_then), (now, steps_now) = self._recent[0], self._recent[-1]
+        seconds = max(now - then, 1e-9)
+        left = seconds / (len(self._recent) - 1) * max(self.epochs - done, 0)
+        parts = [
+            f"epoch {done}/{self.epochs}",
+            f"return {returns.mean():.1f}{spread}" if len(returns) else "return –",
+            f"KL {_mean(record['kl'][healthy]):.2g}",
+            f"saturation {100 * _mean(record['saturation'][healthy]):.1f} %",
+            f"{(steps_now - steps_then) / seconds:,.0f} steps/s",
+            f"{_clock(left)} left",
+        ]
+        if not healthy.all():
+            parts.append(f"{(~healthy).sum()} of {len(healthy)} seeds diverged")
+        return "  ".join(parts)
+
+
+def _mean(values: Any) -> float:
+    return float(np.mean(values)) if len(values) else float("nan")
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

@@ -1,0 +1,256 @@
+"""`inbounds train`: a run in a directory, which can be interrupted at any time and gone on with."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import gymnasium
+
+from inbounds.cli.errors import CommandError, is_disk_full
+from inbounds.cli.options import Train
+from inbounds.cli.progress import TrainingProgress
+from inbounds.cli.tensorboard import TensorBoardWriter
+from inbounds.learning import TrainConfig, Trainer, checkpoint, train
+from inbounds.learning.rollout import check_environments
+from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
+from inbounds.learning.training import Record, describe, make_environments
+from inbounds.robots.registration import TASK_NAMES
+
+FREE_TO_CHANGE = ("--epochs", "--checkpoint-every")
+
+
+class Stop:
+    """The wish to stop: granted after the epoch the first time, at once the second."""
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Take a signal."""
+        if self.signal is not None:
+            raise KeyboardInterrupt
+        self.signal = signal.Signals(number)
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        """Take Ctrl-C, and what job schedulers send, for such a wish."""
+        before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+class Stopped(Exception):  # noqa: N818 (no error)
+    """The wish was granted."""
+
+
+def run(command: Train) -> int:
+    """Train, or go on training, with progress on standard output.
+
+    Raises:
+        CommandError: what was asked for cannot be had, or cannot be kept; the message names the fix.
+    """
+    config, run_dir = command.train_config(), command.run_dir()
+    _check_environment(config)
+    with _claimed(run_dir):
+        return _Session(command, config, run_dir).run()
+
+
+class _Session:
+    """One process' part of a run: what it does after every epoch, and what it says when it ends."""
+
+    def __init__(self, command: Train, config: TrainConfig, run_dir: Path) -> None:
+        self.config, self.run_dir, self.stop = config, run_dir, Stop()
+        self.wants_tensorboard = command.tensorboard
+        self.done = self.kept = _epochs_kept(run_dir, config)
+
+    def run(self) -> int:
+        """Train to the end, or say how far it came and what is kept."""
+        config, start = self.config, self.done
+        with contextlib.ExitStack() as stack:
+            watchers: list[Any] = [stack.enter_context(progress := TrainingProgress(config.epochs))]
+            if self.wants_tensorboard:
+                board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
+                watchers.append(stack.enter_context(board))
+            if start:
+                progress.say(f"going on with {self.run_dir}, {start} epochs done")
+            try:
+                with self.stop.listening():
+                    trainer = train(
+                        config,
+                        run_dir=self.run_dir,
+                        callback=lambda trainer, record: self._after_epoch(trainer, record, watchers),
+                    )
+                    self._save(trainer)
+                    if self.wants_tensorboard and not self.done > start:
+                        board(trainer, trainer.records[-1])
+            except Stopped:
+                raise CommandError(self._kept("stopped"), 128 + (self.stop.signal or 0)) from None
+            except KeyboardInterrupt:
+                raise CommandError(self._kept("stopped in mid-epoch"), 130) from None
+            except ValueError as error:
+                if self.done > start:
+                    raise  # no fault of the user's: nothing was wrong with the first epoch
+                raise CommandError(str(error), 2) from error
+            except (OSError, RuntimeError) as error:
+                raise self._unwritten(error) from error
+        return self._conclude(trainer, start)
+
+    def _after_epoch(self, trainer: Trainer, record: Record, watchers: list[Any]) -> None:
+        self.done = len(trainer.records)
+        for watcher in watchers:
+            watcher(trainer, record)
+        if self.done % self.config.checkpoint_every == 0 or self.done == self.config.epochs:
+            self.kept = self.done  # `train` has just written the checkpoint
+            save_run(self.run_dir, trainer)
+        if self.stop.signal is not None:
+            self._save(trainer)
+            raise Stopped
+
+    def _save(self, trainer: Trainer) -> None:
+        """Have all files say the same, also where `train` leaves no checkpoint or was killed between two files."""
+        if self.kept < len(trainer.records):
+            checkpoint.save(self.run_dir / CHECKPOINT_FILE, trainer.state_dict())
+            self.kept = len(trainer.records)
+        save_run(self.run_dir, trainer)
+
+    def _conclude(self, trainer: Trainer, start: int) -> int:
+        if trainer.diverged.all():
+            raise CommandError(
+                f"all seeds diverged, the last in epoch {len(trainer.records) - 1}; the curves are in {self.run_dir}. "
+                "Train with a smaller --algorithm.learning-rate in another --out"
+            )
+        done = (
+            f"done: {self.done} epochs"
+            if self.done > start
+            else f"there was nothing to do: {start} epochs are done"
+        )
+        print(f"{done}. {self.run_dir} has {CURVES_FILE}, {POLICIES_FILE} and {CHECKPOINT_FILE}")
+        print(f"film it: inbounds watch {self.run_dir}")
+        return 0
+
+    def _kept(self, what: str) -> str:
+        if not self.kept:
+            return f"{what} before the first checkpoint: nothing is kept"
+        return f"{what}. {self.run_dir} keeps {self.kept} epochs; the same command goes on from there"
+
+    def _unwritten(self, error: OSError | RuntimeError) -> BaseException:
+        """What to raise: a line about the disk, or the error itself if it is about something else."""
+        if is_disk_full(error):
+            return CommandError(
+                f"the disk is full. {self._kept('Training stopped')}, once there is room (df -h {self.run_dir})"
+            )
+        if isinstance(error, OSError):
+            return CommandError(f"{self.run_dir} cannot be written: {error}. Choose another --out")
+        return error
+
+
+def _check_environment(config: TrainConfig) -> None:
+    """Raise unless the environment can be made; say what to ask for instead."""
+    tasks = f"The tasks are {', '.join(TASK_NAMES)}"
+    try:
+        envs = make_environments(config, 1)
+        check_environments(envs, 1)
+        envs.close()
+    except gymnasium.error.UnregisteredEnv as error:
+        close = difflib.get_close_matches(config.env, [*TASK_NAMES, *gymnasium.registry], n=1)
+        meant = f"did you mean {close[0]}? " if close else ""
+        raise CommandError(
+            f"no environment {config.env!r}: {meant}{tasks}; any other id that gymnasium.make knows will do too, "
+            "as module:id where a module has to be imported first",
+            2,
+        ) from error
+    except (gymnasium.error.Error, ImportError, ValueError) as error:
+        raise CommandError(f"{config.env} will not do: {error}. {tasks}", 2) from error
+
+
+def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
+    """How many epochs the run directory holds; raises where going on from there would lose or mix something."""
+    if not (run_dir / CHECKPOINT_FILE).exists():
+        if any((run_dir / name).exists() for name in (CURVES_FILE, POLICIES_FILE)):
+            raise CommandError(
+                f"{run_dir} holds a run without its checkpoint, which a new one would overwrite: choose another --out, "
+                f"or move {run_dir} out of the way"
+            )
+        return 0
+    try:
+        state = load_checkpoint(run_dir)
+    except DamagedFileError as error:
+        raise CommandError(str(error)) from error
+    if changes := _differences(state["config"], describe(config)):
+        raise CommandError(
+            f"{run_dir} is the run of another configuration ({changes}): choose another --out, or ask for that one",
+            2,
+        )
+    return len(state["records"])
+
+
+def _differences(theirs: dict[str, Any], ours: dict[str, Any]) -> str:
+    """What a `Trainer` would refuse to change in mid-run, as the command line spells it."""
+    if theirs["algorithm_name"] != ours["algorithm_name"]:
+        return f"--algo {theirs['algorithm_name']} there, {ours['algorithm_name']} here"
+    before, now = _flat(theirs), _flat(ours)
+    return "; ".join(
+        f"{name} {before.get(name, 'absent')} there, {now.get(name, 'absent')} here"
+        for name in sorted(before | now)
+        if before.get(name) != now.get(name) and name not in FREE_TO_CHANGE
+    )
+
+
+def _flat(values: dict[str, Any], prefix: str = "--") -> dict[str, Any]:
+    """Nested values by the names of their options."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        name = prefix + key.replace("_", "-")
+        flat |= _flat(value, f"{name}.") if isinstance(value, dict) else {name: value}
+    return flat
+
+
+@contextlib.contextmanager
+def _claimed(run_dir: Path) -> Iterator[None]:
+    """Make the run directory and hold it, so that no second process trains in it at the same time."""
+    new = [path for path in (run_dir, *run_dir.parents) if not path.exists()]
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+        held = _lock(run_dir)
+    except BlockingIOError as error:
+        raise CommandError(
+            f"another process trains in {run_dir}: wait until it is done, or choose another --out"
+        ) from error
+    except OSError as error:
+        said = "no room on the disk" if is_disk_full(error) else error.strerror
+        raise CommandError(f"{run_dir} cannot be a run directory ({said}): choose another --out") from error
+    try:
+        yield
+    finally:
+        for path in new:
+            with contextlib.suppress(OSError):  # something came of it
+                path.rmdir()
+        held.close()
+
+
+def _lock(directory: Path) -> contextlib.ExitStack:
+    """Lock a directory until the stack is closed or the process dies; raise BlockingIOError if another has it."""
+    held = contextlib.ExitStack()
+    try:
+        import fcntl
+    except ImportError:  # Windows has no such lock: there the user sees to it
+        return held
+    descriptor = os.open(directory, os.O_RDONLY)
+    held.callback(os.close, descriptor)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BaseException:
+        held.close()
+        raise
+    return held

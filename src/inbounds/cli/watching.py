@@ -1,0 +1,101 @@
+"""`inbounds watch`: a trained policy on film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from numpy.typing import NDArray
+
+from inbounds.book.videos import write_film
+from inbounds.cli.errors import CommandError, is_disk_full
+from inbounds.cli.options import Watch
+from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.run_store import POLICIES_FILE, load_policies
+from inbounds.learning.trained_policy import TrainedPolicy
+from inbounds.learning.training import make_environments
+from inbounds.robots import record
+
+
+def run(command: Watch) -> int:
+    """Film a rollout and print its return.
+
+    Raises:
+        CommandError: no such run or seed, nothing to draw with, no room; the message names the fix.
+    """
+    policy = _choose(command)
+    greedy = command.greedy or policy.default_greedy
+    path = command.out or (
+        (command.run if command.run.is_dir() else command.run.parent) / f"{greedy}-seed{policy.seed}.mp4"
+    )
+    if command.seconds <= 0 or min(command.width, command.height) < 2:
+        raise CommandError("--seconds, --width and --height must be positive", 2)
+    if not path.parent.is_dir():
+        raise CommandError(f"there is no folder {path.parent}: make it first (mkdir -p {path.parent})")
+    rng = np.random.default_rng(command.env_seed)
+
+    def act(obs: NDArray[Any]) -> NDArray[Any]:
+        return policy.act(obs.reshape(1, -1), greedy, rng)
+
+    try:
+        envs = RecordEpisodeStatistics(make_environments(policy.config, 1))
+        film = record(
+            envs,
+            act,
+            seconds=command.seconds,
+            seed=command.env_seed,
+            width=command.width,
+            height=command.height,
+        )
+        write_film(path, film)
+    except (ValueError, TypeError, RuntimeError, gymnasium.error.Error) as error:
+        raise CommandError(str(error)) from error
+    except OSError as error:
+        room = " Free some space on the disk and repeat the command." if is_disk_full(error) else ""
+        raise CommandError(f"{path} could not be written: {error.strerror or error}.{room}") from error
+    print(f"{policy.config.env}, {policy.config.policy.family}, seed {policy.seed}, acting by {greedy}")
+    over = ", ".join(f"{value:.1f}" for value in envs.return_queue)
+    count = len(envs.return_queue)
+    episodes = {0: "an episode under way", 1: f"one whole episode: {over}"}.get(
+        count, f"{count} episodes: {over}"
+    )
+    print(f"return {film.total_reward:.1f} in {len(film.frames) / film.fps:.1f} s ({episodes})")
+    print(f"film: {path}")
+    return 0
+
+
+def _choose(command: Watch) -> TrainedPolicy:
+    """The policy that the command means."""
+    try:
+        policies = load_policies(command.run)
+    except FileNotFoundError:
+        here = Path("runs") if command.run.parent == Path() else command.run.parent
+        found = sorted(str(path.parent) for path in here.glob(f"*/{POLICIES_FILE}"))
+        instead = f"choose one of {', '.join(found)}" if found else "train one first (inbounds train --help)"
+        raise CommandError(f"there is no trained run in {command.run}: {instead}") from None
+    except DamagedFileError as error:
+        raise CommandError(str(error)) from error
+    healthy = [str(i) for i, policy in enumerate(policies) if not policy.diverged]
+    if not 0 <= command.seed_index < len(policies):
+        raise CommandError(
+            f"--seed-index {command.seed_index}: the run has {len(policies)} seeds, 0 to {len(policies) - 1}",
+            2,
+        )
+    policy = policies[command.seed_index]
+    if policy.diverged:
+        instead = (
+            f"choose another --seed-index, of {', '.join(healthy)}"
+            if healthy
+            else "all seeds did: train anew"
+        )
+        raise CommandError(f"seed {policy.seed} diverged in training: {instead}")
+    if command.greedy is not None and command.greedy not in policy.greedy_choices:
+        raise CommandError(
+            f"{policy.config.policy.family} does not act by {command.greedy}: "
+            f"choose --greedy {', '.join(policy.greedy_choices)}",
+            2,
+        )
+    return policy
