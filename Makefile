@@ -42,7 +42,7 @@ serve: book  ## preview the built book on this machine  (PORT=8000)
 	$(PY) -m http.server --bind 127.0.0.1 --directory _build/html $(PORT)
 
 lab: setup  ## open JupyterLab on the notebooks
-	@$(PY) -m jupyterlab --notebook-dir=notebooks
+	@$(PY) -m jupyterlab --notebook-dir=notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
 
 dist: book  ## zip the built book for reading offline
 	@$(PY) tools/build_book.py --zip
