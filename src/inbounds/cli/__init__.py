@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -34,14 +35,18 @@ def main(args: Sequence[str] | None = None) -> int:
         args: of the command line, without the program's name; None takes `sys.argv`.
 
     Returns:
-        The exit code: 0, or 1 where something failed, 2 where the command line is wrong, 130 after Ctrl-C.
+        The exit code: 0, or 1 where something failed, 2 where the command line is wrong, 130 after Ctrl-C,
+        141 where nobody reads the output any more.
     """
     args = list(sys.argv[1:] if args is None else args)
     try:
         return _run(args)
     except KeyboardInterrupt:
-        print("\nInterrupted.", file=sys.stderr)
+        print("\ninbounds: interrupted", file=sys.stderr)
         return 130
+    except BrokenPipeError:  # whoever read the output (`| head`) has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python's own last flush
+        return 141
 
 
 def _run(args: list[str]) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 from inbounds.cli.errors import CommandError
 
 SCRIPT = Path("benchmarks") / "run.py"
+MODULE = "benchmarks.run"
 
 
 def find_root() -> Path | None:
@@ -35,4 +36,4 @@ def run(args: Sequence[str]) -> int:
         raise CommandError(
             f"{SCRIPT} is not part of the installed package: clone the project, and run `make bench` in it"
         )
-    return subprocess.run([sys.executable, str(SCRIPT), *args], cwd=root, check=False).returncode
+    return subprocess.run([sys.executable, "-m", MODULE, *args], cwd=root, check=False).returncode

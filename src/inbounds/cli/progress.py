@@ -9,8 +9,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.text import Text
 
 from inbounds.learning import Trainer
 from inbounds.learning.training import Record
@@ -30,35 +32,33 @@ class TrainingProgress:
 
     Example:
         >>> from inbounds.learning import preset, train
-        >>> with TrainingProgress(epochs=1) as progress:
+        >>> with TrainingProgress(epochs=1) as progress:  # doctest: +ELLIPSIS
         ...     run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1), callback=progress)
         epoch 1/1  return ... ± ...  KL ...  saturation ... %  ... steps/s  0:00 left
     """
 
     def __init__(self, epochs: int, console: Console | None = None) -> None:
         self.epochs = epochs
-        self.console = console or Console(soft_wrap=True, highlight=False)
+        # In a notebook too, plain lines: they can be read in the stored file.
+        self.console = console or Console(soft_wrap=True, highlight=False, force_jupyter=False)
         self._returns: Any = None  # [S], of each seed the last one known
         self._recent: deque[tuple[float, int]] = deque(maxlen=20)  # (time, env steps of all seeds)
         self._last_line = -np.inf
-        columns = (TextColumn("{task.description}"), BarColumn(bar_width=None))
-        self._bar = Progress(
-            *columns, console=self.console, expand=True, disable=not self.console.is_terminal
-        )
-        self._task = self._bar.add_task(f"epoch 0/{epochs}", total=epochs)
+        self._live = Live(self._picture(f"epoch 0/{epochs}", 0), console=self.console, refresh_per_second=4)
 
     def __enter__(self) -> Self:
         self._warnings = warnings.catch_warnings()
         self._warnings.__enter__()
         warnings.showwarning = lambda message, *_args, **_kwargs: self.say(f"warning: {message}")
         self._recent.append((time.perf_counter(), 0))
-        self._bar.start()
+        if self.console.is_terminal:
+            self._live.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bar.stop()
+        self._live.stop()
         self._warnings.__exit__(kind, error, trace)
 
     def __call__(self, trainer: Trainer, record: Record) -> None:
@@ -68,15 +68,19 @@ class TrainingProgress:
         self._recent.append((now, self._recent[-1][1] + horizon * len(trainer.config.seeds)))
         self._remember_returns(trainer)
         text = self._describe(record, done)
-        self._bar.update(self._task, completed=done, description=text)
-        is_due = now - self._last_line >= SECONDS_BETWEEN_LINES or done >= self.epochs
-        if not self.console.is_terminal and is_due:
+        if self.console.is_terminal:
+            self._live.update(self._picture(text, done))
+        elif now - self._last_line >= SECONDS_BETWEEN_LINES or done >= self.epochs:
             self.say(text)
             self._last_line = now
 
     def say(self, text: str) -> None:
         """Write a line, above the bar."""
         self.console.print(text, markup=False)
+
+    def _picture(self, text: str, done: int) -> Group:
+        """The numbers, and a bar below them that is as wide as the terminal."""
+        return Group(Text(text), ProgressBar(total=self.epochs, completed=done))
 
     def _remember_returns(self, trainer: Trainer) -> None:
         """Take in the returns of the last epoch; at first, of all epochs that a resumed run has behind it."""
@@ -96,7 +100,7 @@ class TrainingProgress:
         parts = [
             f"epoch {done}/{self.epochs}",
             f"return {returns.mean():.1f}{spread}" if len(returns) else "return –",
-            f"KL {_mean(record['kl'][healthy]):.2g}",
+            f"KL {_mean(record['kl'][healthy]):#.2g}",
             f"saturation {100 * _mean(record['saturation'][healthy]):.1f} %",
             f"{(steps_now - steps_then) / seconds:,.0f} steps/s",
             f"{_clock(left)} left",

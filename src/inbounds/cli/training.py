@@ -150,7 +150,7 @@ class _Session:
             return CommandError(
                 f"the disk is full. {self._kept('Training stopped')}, once there is room (df -h {self.run_dir})"
             )
-        if isinstance(error, OSError):
+        if isinstance(error, OSError) and not isinstance(error, BrokenPipeError):
             return CommandError(f"{self.run_dir} cannot be written: {error}. Choose another --out")
         return error
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -276,9 +277,13 @@ def load_checkpoint(run_dir: str | Path) -> dict[str, Any]:
         "Nothing has been changed"
     )
     try:
+        with zipfile.ZipFile(path) as parts:  # torch writes checksums and does not look at them
+            bad = parts.testzip()
         state = checkpoint.load(path)
     except Exception as error:  # torch raises whatever the damage makes it stumble over
         raise damaged(path, error, remedy) from error
+    if bad is not None:
+        raise damaged(path, f"the checksum of {bad} is wrong", remedy)
     if not isinstance(state, dict) or not {"config", "networks", "records"} <= state.keys():
         raise damaged(path, "it holds no run", remedy)
     return state

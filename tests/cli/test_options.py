@@ -1,0 +1,166 @@
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inbounds.cli import options
+from inbounds.learning import FAMILIES, NetworkConfig, PolicyConfig, TrainConfig, preset
+from inbounds.learning.config import ALGORITHMS
+from inbounds.learning.laws import Limits
+from tests.cli.small import run, succeeds
+
+PRESETS = get_args(options.PresetName)
+
+
+def option_names(algo: str) -> set[str]:
+    """What --help must show, from the configurations themselves."""
+    own = {"env", "seeds", "epochs", "algorithm", "policy", "network"}
+    sections = {
+        "": {f.name for f in dataclasses.fields(TrainConfig)} - own,
+        "algorithm.": {f.name for f in dataclasses.fields(ALGORITHMS[algo][0])},
+        "policy.": {f.name for f in dataclasses.fields(PolicyConfig)} - {"family", "limits"},
+        "policy.limits.": {f.name for f in dataclasses.fields(Limits)},
+        "network.": {f.name for f in dataclasses.fields(NetworkConfig)},
+    }
+    names = {f"--{prefix}{name.replace('_', '-')}" for prefix, fields in sections.items() for name in fields}
+    return names | {"--policy", "--seeds", "--epochs", "--preset", "--algo", "--out", "--tensorboard"}
+
+
+def test_the_choices_are_those_of_the_tables() -> None:
+    assert set(get_args(options.FamilyName)) == set(FAMILIES)
+    assert set(get_args(options.AlgorithmName)) == set(ALGORITHMS)
+    for name in PRESETS:
+        preset(name)
+
+
+@pytest.mark.parametrize("algo", list(ALGORITHMS))
+def test_help_shows_every_value_with_its_meaning_and_ends_in_examples(
+    algo: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")  # one column of options
+    before, examples = succeeds(["train", "--algo", algo, "--help"]).split("\nexamples:\n")
+    meanings = {}
+    for chunk in re.split(r"\n\s*(?=--\w)", before)[1:]:
+        names, meaning = chunk.split("\n", 1)
+        meanings[names.split()[0].rstrip(",")] = " ".join(meaning.split())
+    assert meanings.keys() == option_names(algo)
+    for name, meaning in meanings.items():
+        text, default = meaning.split("(default:", 1)
+        assert len(text) > 5, name  # its docstring
+        assert default, name
+    assert "inbounds train HalfCheetah-v5 --policy logit-normal" in examples
+
+
+def test_help_shows_the_values_of_the_preset(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    printed = succeeds(["train", "--preset", "as-printed", "--help"])
+    common = succeeds(["train", "--help"])
+    assert "|r − 1| = ε. (default: 0.02)" in printed
+    assert "|r − 1| = ε. (default: 0.2)" in common
+
+
+@pytest.mark.parametrize("command", ["train", "watch", "bench", None])
+def test_each_command_has_help_and_examples(command: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inbounds.cli.benchmark.find_root", lambda: None)
+    text = succeeds([command, "--help"] if command else [])
+    assert f"\nexamples:\n  inbounds {command or 'train'}" in text
+
+
+@pytest.mark.parametrize("algo", list(ALGORITHMS))
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_command_line_is_its_preset(algo: str, name: str) -> None:
+    words = ["train", "Ant-v5", "--policy", "beta", "--algo", algo, "--preset", name, "--seeds", "3"]
+    command = options.parse([*words, "--epochs", "7"])
+    assert isinstance(command, options.Train)
+    config = command.train_config()
+    assert config == preset(name, "Ant-v5", policy="beta", algo=algo, seeds=3, epochs=7)
+    assert type(config) is TrainConfig
+    assert type(config.policy) is PolicyConfig
+
+
+def test_any_value_can_be_overridden() -> None:
+    words = (
+        "train Hopper-v5 --algorithm.clip-range 0.1 --algorithm.max-grad-norm None --policy.initial-std 0.5"
+    )
+    words += (
+        " --policy.limits.log-std-max 0.5 --network.hidden-sizes 32 16 --no-normalize-obs --preset=as-printed"
+    )
+    command = options.parse(words.split())
+    assert isinstance(command, options.Train)
+    config, printed = command.train_config(), preset("as-printed", "Hopper-v5")
+    assert config == dataclasses.replace(
+        printed,
+        algorithm=dataclasses.replace(printed.algorithm, clip_range=0.1),
+        policy=PolicyConfig(initial_std=0.5, limits=Limits(log_std_max=0.5)),
+        network=dataclasses.replace(printed.network, hidden_sizes=(32, 16)),
+    )
+    assert command.run_dir() == Path("runs/Hopper-v5-logit-normal-ppo-as-printed")
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.integers(0, 30), min_size=1, unique=True).map(tuple))
+def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
+    assert options.parse_seeds(options.format_seeds(seeds)) == seeds
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("train --policy normal", "'clipped-gaussian', 'beta'"),
+        ("train --algo sac", "'policy-gradient'"),
+        ("train --algorithm.clip-range -1", "clip_range must be positive"),
+        ("train --algorithm.clip-rnge 0.1", "--algorithm.clip-range"),
+        ("train --algorithm.minibatch-size 100", "minibatch_size must divide horizon"),
+        ("train --seeds ten", "a number of seeds (10), some of them (0,7)"),
+        ("train --seeds 1,1", "seeds must be different"),
+        ("train --policy beta --policy.no-state-dependent-std", "state_dependent_std=True"),
+        ("train HalfCheeta-v5", "did you mean HalfCheetah-v5?"),
+        ("train Tennis-v0", "The tasks are Hopper-v5, Walker2d-v5"),
+        ("train CartPole-v1", "bounded, one-dimensional Box, got Discrete(2): wrap"),
+        ("walk", "train, watch, bench"),
+    ],
+)
+def test_a_wrong_command_line_is_told_the_right_one(
+    words: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*words.split())
+    assert code == 2
+    assert message in err
+    assert out == ""
+    assert not list(tmp_path.iterdir())  # a mistyped command leaves nothing behind
+
+
+def test_as_a_module_in_a_process_of_its_own() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "inbounds", "watch", "nowhere"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "inbounds: there is no trained run in nowhere: train one first (inbounds train --help)\n"
+    )
+
+
+def test_bench_runs_the_script_of_the_source_tree(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("inbounds.cli.benchmark.find_root", lambda: tmp_path)
+    (tmp_path / "benchmarks").mkdir()
+    script = "import os, sys; print(sys.argv[1:], os.listdir()); sys.exit(3)"
+    (tmp_path / "benchmarks" / "run.py").write_text(script)
+    assert run("bench", "--quick", "--help")[0] == 3
+    assert capfd.readouterr().out == "['--quick', '--help'] ['benchmarks']\n"
+
+
+def test_bench_without_the_source_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inbounds.cli.benchmark.find_root", lambda: None)
+    code, _, err = run("bench")
+    assert code == 1
+    assert "clone the project, and run `make bench`" in err

@@ -1,0 +1,323 @@
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import torch
+from rich.console import Console
+
+from inbounds.cli import main
+from inbounds.cli.errors import is_disk_full
+from inbounds.cli.progress import TrainingProgress
+from inbounds.learning import Trainer, checkpoint
+from inbounds.learning.run_store import load_checkpoint, load_policies, read_curves
+from tests.cli.small import contents, run, same_rows, small, succeeds
+
+FILES = {"checkpoint.pt", "curves.parquet", "policies.safetensors"}
+
+
+def test_a_run_leaves_curves_policies_and_a_checkpoint(tmp_path: Path) -> None:
+    out = succeeds(small(tmp_path / "run"))
+    assert contents(tmp_path / "run").keys() == FILES
+    curves = read_curves(tmp_path / "run")
+    assert curves["epoch"].to_pylist() == [0, 0, 1, 1, 2, 2]
+    assert curves["seed"].to_pylist() == [0, 1] * 3
+    assert f"film it: inbounds watch {tmp_path / 'run'}" in out
+
+
+# ---- progress
+
+
+def test_plain_lines_where_there_is_no_terminal(tmp_path: Path) -> None:
+    out = succeeds(small(tmp_path / "run"))
+    last = next(line for line in out.splitlines() if line.startswith("epoch 3/3"))
+    curves = read_curves(tmp_path / "run")
+    returns, kl = curves["return_mean"].to_numpy()[-2:], curves["kl"].to_numpy()[-2:]
+    assert f"return {returns.mean():.1f} ± {returns.std(ddof=1):.1f}  KL {kl.mean():#.2g}  saturation" in last
+    assert "steps/s  0:00 left" in last
+    assert "\x1b" not in out
+    assert "\r" not in out
+
+
+def test_a_bar_on_a_terminal() -> None:
+    console = Console(force_terminal=True, width=150, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    command = small(Path("unused"))
+    from inbounds.cli import options
+
+    trainer = Trainer(options.parse(command).train_config())  # type: ignore[union-attr]
+    with TrainingProgress(3, console) as progress:
+        for _ in range(3):
+            progress(trainer, trainer.epoch())
+    text = console.export_text()
+    console.file.close()
+    assert "epoch 3/3  return" in text
+    assert "━━━" in text
+
+
+def test_the_return_of_a_seed_is_the_last_one_known() -> None:
+    class Run:
+        records: list[dict]
+        config = type("Config", (), {"seeds": (0, 1, 2), "algorithm": type("A", (), {"horizon": 4})})
+
+    def record(*returns: float, diverged: tuple[bool, ...] = (False,) * 3) -> dict:
+        numbers = {name: np.array([0.25, 0.25, np.nan]) for name in ("kl", "saturation")}
+        return {"return_mean": np.array(returns), "diverged": np.array(diverged), **numbers}
+
+    console = Console(width=200, file=open(os.devnull, "w"), record=True)  # noqa: SIM115
+    Run.records = [record(1.0, np.nan, 100.0), record(np.nan, 3.0, np.nan, diverged=(False, False, True))]
+    with TrainingProgress(2, console) as progress:
+        progress(Run, Run.records[-1])  # as a resumed run: the first epoch was never shown
+    console.file.close()
+    text = console.export_text()
+    assert "return 2.0 ± 1.4  KL 0.25  saturation 25.0 %" in text
+    assert "1 of 3 seeds diverged" in text
+
+
+def test_when_all_seeds_diverge(tmp_path: Path) -> None:
+    code, out, err = run(*small(tmp_path / "run", 5), "--algorithm.learning-rate", "1e30")
+    assert code == 1
+    assert "warning: seeds [0, 1] diverged in epoch 0" in out
+    assert "all seeds diverged, the last in epoch 0" in err
+    assert "smaller --algorithm.learning-rate" in err
+    assert read_curves(tmp_path / "run")["diverged"].to_pylist() == [True, True]
+    code, _, err = run(*small(tmp_path / "run", 5), "--algorithm.learning-rate", "1e30")
+    assert code == 1
+    assert "all seeds diverged" in err
+    code, _, err = run("watch", tmp_path / "run")
+    assert code == 1
+    assert "seed 0 diverged in training: all seeds did: train anew" in err
+
+
+# ---- interruption
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """Bit for bit: the same rows (wall time apart) and the same policies as the run that was not interrupted."""
+    command = [sys.executable, "-m", "inbounds", *small(tmp_path / "broken", 100_000)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.readline().startswith("epoch 1/")
+        wait_for(tmp_path / "broken" / "curves.parquet")
+        time.sleep(0.1)  # anywhere in an epoch
+        process.send_signal(number)
+        err = process.stderr.read()
+    kept = len(load_checkpoint(tmp_path / "broken")["records"])
+    if number == signal.SIGKILL:
+        assert process.returncode == -number
+    else:
+        assert process.returncode == 128 + number
+        assert f"stopped. {tmp_path / 'broken'} keeps {kept} epochs; the same command goes on" in err
+        assert "Traceback" not in err
+        assert len(read_curves(tmp_path / "broken")) == 2 * kept
+    assert f"{kept} epochs done" in succeeds(small(tmp_path / "broken", kept + 3))
+    succeeds(small(tmp_path / "whole", kept + 3))
+    assert same_rows(*(read_curves(tmp_path / name) for name in ("broken", "whole")))
+    for name in ("policies.safetensors",):
+        assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def wait_for(path: Path) -> None:
+    for _ in range(600):
+        if path.exists():
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{path} never came")
+
+
+def test_ctrl_c_twice_ends_at_once_and_says_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step, steps = checkpoint.save, []
+
+    def impatient(path: Path, state: dict) -> None:
+        steps.append(path)
+        if len(steps) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
+        step(path, state)
+
+    monkeypatch.setattr(checkpoint, "save", impatient)
+    code, _, err = run(*small(tmp_path / "run", 10))
+    assert code == 130
+    assert f"stopped in mid-epoch. {tmp_path / 'run'} keeps 2 epochs" in err
+    assert len(load_checkpoint(tmp_path / "run")["records"]) == 2
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) -> None:
+    succeeds(small(tmp_path / "run", 2))
+    before = contents(tmp_path / "run")
+    assert "there was nothing to do: 2 epochs are done" in succeeds(small(tmp_path / "run", 2))
+    assert contents(tmp_path / "run") == before
+    succeeds(small(tmp_path / "run", 4))
+    succeeds(small(tmp_path / "whole", 4))
+    assert same_rows(read_curves(tmp_path / "run"), read_curves(tmp_path / "whole"))
+
+
+# ---- what could be lost
+
+
+@pytest.mark.parametrize(
+    ("more", "difference"),
+    [
+        (["--algorithm.clip-range", "0.1"], "(--algorithm.clip-range 0.2 there, 0.1 here)"),
+        (["--policy", "beta"], "(--policy.family logit-normal there, beta here)"),
+        (["--algo", "trpo"], "(--algo ppo there, trpo here)"),
+    ],
+)
+def test_another_configuration_is_refused(more: list[str], difference: str, tmp_path: Path) -> None:
+    succeeds(small(tmp_path / "run", 1))
+    before = contents(tmp_path / "run")
+    code, _, err = run(*small(tmp_path / "run", 2), *more)
+    assert code == 2
+    assert difference in err
+    assert "choose another --out" in err
+    assert contents(tmp_path / "run") == before
+
+
+def test_a_run_without_its_checkpoint_is_not_overwritten(tmp_path: Path) -> None:
+    succeeds(small(tmp_path / "run", 1))
+    (tmp_path / "run" / "checkpoint.pt").unlink()
+    before = contents(tmp_path / "run")
+    code, _, err = run(*small(tmp_path / "run", 2))
+    assert code == 1
+    assert "without its checkpoint, which a new one would overwrite" in err
+    assert contents(tmp_path / "run") == before
+
+
+@pytest.mark.parametrize("harm", ["cut short", "empty", "flipped", "text"])
+def test_a_damaged_checkpoint_is_named_and_nothing_is_lost(harm: str, tmp_path: Path) -> None:
+    succeeds(small(tmp_path / "run", 2))
+    path = tmp_path / "run" / "checkpoint.pt"
+    damage(path, harm)
+    before = contents(tmp_path / "run")
+    code, _, err = run(*small(tmp_path / "run", 4))
+    assert code == 1
+    assert err.count("\n") == 1
+    assert f"{path} is damaged, cut short or of another origin" in err
+    assert f"move {path.parent} out of the way and train again" in err
+    assert contents(tmp_path / "run") == before
+
+
+@pytest.mark.parametrize("harm", ["cut short", "empty", "flipped", "text"])
+@pytest.mark.parametrize("name", ["curves.parquet", "policies.safetensors"])
+def test_damaged_curves_and_policies_are_written_anew(name: str, harm: str, tmp_path: Path) -> None:
+    succeeds(small(tmp_path / "run", 2))
+    path = tmp_path / "run" / name
+    whole = path.read_bytes()
+    damage(path, harm)
+    read = read_curves if name == "curves.parquet" else load_policies
+    with pytest.raises(ValueError, match=r"repeat the `inbounds train` command of this run"):
+        read(tmp_path / "run")
+    if read is load_policies:
+        code, _, err = run("watch", tmp_path / "run")
+        assert (code, err.count("\n")) == (1, 1)
+        assert f"{path} is damaged" in err
+    succeeds(small(tmp_path / "run", 2))
+    assert path.read_bytes() == whole
+
+
+def damage(path: Path, harm: str) -> None:
+    data = path.read_bytes()
+    if harm == "flipped":  # one bit of the numbers themselves
+        where = len(data) // 2
+        if path.suffix == ".parquet":
+            column = pq.ParquetFile(path).metadata.row_group(0).column(6)
+            where = column.data_page_offset + column.total_compressed_size - 1
+        path.write_bytes(data[:where] + bytes([data[where] ^ 64]) + data[where + 1 :])
+    else:
+        harms = {"cut short": data[: len(data) // 2], "empty": b"", "text": b"not what you think\n" * 100}
+        path.write_bytes(harms[harm])
+
+
+def test_a_full_disk_keeps_the_last_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls, sync = [], os.fsync
+
+    def full(descriptor: int) -> None:
+        calls.append(descriptor)
+        if len(calls) == 4:  # checkpoint, curves and policies of epoch 2; then the checkpoint of epoch 4
+            raise OSError(errno.ENOSPC, "No space left on device")
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    code, _, err = run(*small(tmp_path / "run", 6))
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "the disk is full" in err
+    assert (
+        f"{tmp_path / 'run'} keeps 2 epochs; the same command goes on from there, once there is room" in err
+    )
+    succeeds(small(tmp_path / "run", 6))
+    succeeds(small(tmp_path / "whole", 6))
+    assert same_rows(read_curves(tmp_path / "run"), read_curves(tmp_path / "whole"))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that Linux has")
+def test_a_full_disk_is_recognised_in_what_torch_makes_of_it() -> None:
+    disk = open("/dev/full", "wb", buffering=0)  # noqa: SIM115 (closed below)
+    with pytest.raises((RuntimeError, OSError)) as caught:
+        torch.save({"weights": torch.zeros(100_000)}, disk)
+    disk.close()
+    assert is_disk_full(caught.value)
+    assert not is_disk_full(RuntimeError("of another kind"))
+
+
+def test_where_no_run_directory_can_be(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    code, _, err = run(*small(tmp_path / "file"))
+    assert code == 1
+    assert "cannot be a run directory (File exists): choose another --out" in err
+
+
+def test_two_processes_do_not_train_in_one_directory(tmp_path: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    descriptor = os.open(tmp_path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        code, _, err = run(*small(tmp_path))
+    finally:
+        os.close(descriptor)
+    assert code == 1
+    assert "another process trains" in err
+    assert not list(tmp_path.iterdir())
+    succeeds(small(tmp_path, 1))
+
+
+# ---- TensorBoard
+
+
+def test_tensorboard_shows_the_curves_once(tmp_path: Path) -> None:
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    succeeds(small(tmp_path / "run", 2, "Hopper-v5", "--tensorboard"))
+    succeeds(small(tmp_path / "run", 4, "Hopper-v5", "--tensorboard"))
+    curves = read_curves(tmp_path / "run")
+    of_seed = curves.filter(np.array(curves["seed"]) == 1)
+    events = accumulator.EventAccumulator(str(tmp_path / "run" / "tensorboard" / "seed-1")).Reload()
+    scalars = events.Scalars("kl")
+    assert [event.step for event in scalars] == of_seed["env_steps"].to_pylist() == [128, 256, 384, 512]
+    np.testing.assert_allclose([event.value for event in scalars], of_seed["kl"].to_numpy(), rtol=1e-6)
+
+
+def test_tensorboard_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "tensorboard", None)
+    monkeypatch.delitem(sys.modules, "torch.utils.tensorboard", raising=False)
+    code, _, err = run(*small(tmp_path / "run", 1, "Hopper-v5", "--tensorboard"))
+    assert code == 1
+    assert "pip install 'inbounds[tensorboard]'" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_main_takes_the_command_line_of_the_process(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["inbounds", "watch", "nowhere"])
+    assert main() == 1
+    assert "there is no trained run in nowhere" in capsys.readouterr().err

@@ -1,0 +1,77 @@
+from pathlib import Path
+
+import gymnasium
+import imageio_ffmpeg
+import numpy as np
+import pytest
+
+from inbounds.learning.run_store import load_policy
+from tests.cli.small import run, small, succeeds
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    succeeds(small(folder / "hopper", 2))
+    succeeds(small(folder / "beta", 1, "Swimmer-v5", "--policy", "beta"))
+    return folder
+
+
+@pytest.mark.parametrize("greedy", ["median", "mode", "sample"])
+def test_the_film_shows_the_rollout_that_gymnasium_gives(greedy: str, runs: Path, tmp_path: Path) -> None:
+    film = tmp_path / "film.mp4"
+    words = ["watch", runs / "hopper", "--greedy", greedy, "--seed-index", "1", "--seconds", "0.2"]
+    out = succeeds([*words, "--env-seed", "5", "--width", "64", "--height", "48", "--out", film])
+
+    env = gymnasium.make("Hopper-v5")
+    policy, rng = load_policy(runs / "hopper", seed_index=1), np.random.default_rng(5)
+    obs, _ = env.reset(seed=5)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
+    stride = round(seconds / frames / env.unwrapped.dt)
+    total = 0.0
+    for _ in range((frames - 1) * stride + 1):
+        obs, reward, terminated, truncated, _ = env.step(policy.act(obs, greedy, rng))
+        total += reward
+        if terminated or truncated:
+            obs, _ = env.reset()
+    assert f"return {total:.1f} in 0.2 s" in out
+    assert f"seed 1, acting by {greedy}" in out
+    assert abs(seconds - 0.2) < 0.05
+
+
+def test_by_default_the_median_of_the_first_seed_in_the_run_directory(runs: Path) -> None:
+    out = succeeds(["watch", runs / "hopper", "--seconds", "3", "--width", "64", "--height", "48"])
+    assert "seed 0, acting by median" in out
+    assert "episodes: " in out  # an untrained hopper falls
+    assert (runs / "hopper" / "median-seed0.mp4").stat().st_size > 1000
+    out = succeeds(
+        [
+            "watch",
+            runs / "beta" / "policies.safetensors",
+            "--seconds",
+            "0.2",
+            "--width",
+            "64",
+            "--height",
+            "48",
+        ]
+    )
+    assert "Swimmer-v5, beta, seed 0, acting by" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        ("nowhere", 1, "choose one of {runs}/beta, {runs}/hopper"),
+        ("hopper --seed-index 2", 2, "the run has 2 seeds, 0 to 1"),
+        ("hopper --seconds 0", 2, "must be positive"),
+        ("hopper --width 63 --seconds 0.1", 1, "must be even"),
+        ("hopper --out no/such/folder/film.mp4", 1, "mkdir -p no/such/folder"),
+    ],
+)
+def test_what_cannot_be_watched(words: str, code: int, message: str, runs: Path) -> None:
+    name, *more = words.split()
+    got, _, err = run("watch", runs / name, *more)
+    assert got == code
+    assert message.format(runs=runs) in err
+    assert err.count("\n") == 1
