@@ -44,6 +44,14 @@ def test_the_map_takes_the_latents_range_to_the_box(family: str) -> None:
     assert (np.diff(policy(family).action(np.linspace(ends[0], ends[2], 9)), axis=0) >= 0).all()
 
 
+def test_the_maps_are_those_of_the_public_distributions() -> None:
+    latent = torch.linspace(-4, 4, 9, dtype=torch.float64)
+    for family in ("logit-normal", "clipped-gaussian"):
+        law = action_law(family, Parameters(torch.zeros(9).double(), torch.zeros(9).double()))
+        unit = FAMILIES[family].to_unit(latent, torch)
+        assert torch.allclose(unit, law.latent_to_value(latent), atol=1e-12)
+
+
 def test_only_the_gaussian_leaves_the_box() -> None:
     far = np.array([[3.0, -3.0]])
     assert (policy("gaussian").action(far) > HIGH).any()

@@ -220,5 +220,10 @@ def scaled_beta(parameters: Parameters, low: float = -1.0) -> ScaledBeta:
 
 
 def _halves(outputs: Array) -> tuple[Array, Array]:
+    if isinstance(outputs, Tensor):
+        first, second = outputs.chunk(
+            2, -1
+        )  # its derivative is one concatenation, that of two slices five operations
+        return first, second
     act_dim = outputs.shape[-1] // 2
     return outputs[..., :act_dim], outputs[..., act_dim:]

@@ -75,8 +75,8 @@ def logit_normal_entropy(parameters: Parameters) -> Tensor:
 class _ExpectedLogSlope(torch.autograd.Function):
     """E[log ½(1 − tanh²(z/2))] for z ~ Normal, elementwise: by 15 nodes, its gradient by the same nodes.
 
-    With log ½(1 − tanh²(z/2)) = log 2 − 2 (|z|/2 + log(1 + exp(−|z|))) and its derivative −tanh(z/2). NumPy and long inner
-    loops, because PPO evaluates it in every minibatch.
+    With log ½(1 − tanh²(z/2)) = log 2 − 2 (|z|/2 + log(1 + exp(−|z|))) and its derivative −tanh(z/2). In NumPy
+    and with long inner loops, because PPO evaluates it in every minibatch.
     """
 
     @staticmethod
