@@ -1,0 +1,108 @@
+"""Are two sets of learning curves equivalent? Two one-sided tests on the ratio of the mean areas under them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.optimize import brentq
+
+
+def area(returns: ArrayLike) -> NDArray[np.float64]:
+    """Return the area under learning curves per epoch: the mean over epochs, `[...]`, of `[..., epochs]`.
+
+    An epoch in which no episode ended (NaN) counts as the one before it; before the first that ended, not at all.
+
+    Example:
+        >>> area([[np.nan, 1.0, np.nan, 4.0]]).tolist()  # of 1, 1 and 4
+        [2.0]
+    """
+    curves = np.array(returns, float)
+    for epoch in range(1, curves.shape[-1]):
+        missing = np.isnan(curves[..., epoch])
+        curves[..., epoch] = np.where(missing, curves[..., epoch - 1], curves[..., epoch])
+    return np.nanmean(curves, -1)
+
+
+@dataclass(frozen=True)
+class Equivalence:
+    """Outcome of the two one-sided tests of `equivalence`."""
+
+    ratio: float
+    """Our mean over the peer's."""
+    low: float
+    """Lower end of the interval of the ratio, with coverage 1 − 2 · level."""
+    high: float
+    """Upper end; the tests succeed where the interval lies within the margin."""
+    p_value: float
+    """The larger of the two one-sided p-values."""
+    equivalent: bool
+    """Whether it is below the level."""
+
+
+def _one_sided(ours: NDArray[np.float64], theirs: NDArray[np.float64], ratio: float) -> tuple[float, float]:
+    """Return Welch's t and its degrees of freedom for the hypothesis that our mean is `ratio` times theirs."""
+    parts = np.array([ours.var(ddof=1) / len(ours), ratio**2 * theirs.var(ddof=1) / len(theirs)])
+    freedom = parts.sum() ** 2 / (parts**2 / [len(ours) - 1, len(theirs) - 1]).sum()
+    return float((ours.mean() - ratio * theirs.mean()) / np.sqrt(parts.sum())), float(freedom)
+
+
+def equivalence(ours: ArrayLike, theirs: ArrayLike, margin: float = 0.15, level: float = 0.05) -> Equivalence:
+    """Test whether our mean lies within ± margin of the peer's mean (two one-sided tests, Schuirmann 1987).
+
+    The bounds (1 ± margin) · mean(theirs) are themselves estimated. The hypotheses are therefore put as
+    mean(ours) − (1 ± margin) · mean(theirs), linear in both means, with unequal variances (Welch), and the interval of
+    the ratio is the set of ratios that no one-sided test rejects.
+
+    Args:
+        ours: `[n]`, one number per seed.
+        theirs: `[m]`, with a mean above zero.
+        margin: relative.
+        level: of each test.
+
+    Returns:
+        Ratio, interval, p-value, verdict.
+
+    Raises:
+        ValueError: fewer than two seeds, or a peer's mean that is not significantly above zero.
+
+    Example:
+        >>> outcome = equivalence([100, 102, 98, 101], [99, 101, 100, 102])
+        >>> round(outcome.ratio, 3), outcome.equivalent
+        (0.998, True)
+    """
+    a, b = np.asarray(ours, float), np.asarray(theirs, float)
+    if min(len(a), len(b)) < 2:
+        raise ValueError(f"at least two seeds a side are needed, got {len(a)} and {len(b)}: train more")
+    if not stats.ttest_1samp(b, 0, alternative="greater").pvalue < level:
+        raise ValueError(
+            f"the peer's mean {b.mean():.4g} is not clearly above zero, and a share of it means nothing: train longer"
+        )
+    above_low, below_high = _one_sided(a, b, 1 - margin), _one_sided(a, b, 1 + margin)
+    p_value = max(stats.t.sf(*above_low), stats.t.cdf(*below_high))
+    return Equivalence(
+        ratio=float(a.mean() / b.mean()),
+        low=_limit(a, b, level, upwards=False),
+        high=_limit(a, b, level, upwards=True),
+        p_value=float(p_value),
+        equivalent=bool(p_value < level),
+    )
+
+
+def _limit(ours: NDArray[np.float64], theirs: NDArray[np.float64], level: float, upwards: bool) -> float:
+    """Return the ratio, above or below the estimate, at which the one-sided p-value reaches the level."""
+    middle = ours.mean() / theirs.mean()
+    sign = 1 if upwards else -1
+
+    def excess(ratio: float) -> float:
+        t, freedom = _one_sided(ours, theirs, ratio)
+        return float(stats.t.cdf(sign * t, freedom)) - level
+
+    outside = middle + 0.01 * sign
+    while excess(outside) > 0:
+        outside = middle + 2 * (outside - middle)
+        if abs(outside) > 1e6:  # the peer's mean is too close to zero for its noise
+            return float(sign * np.inf)
+    return float(brentq(excess, middle, outside, xtol=1e-12))

@@ -1,0 +1,186 @@
+"""From raw measurements to ratios, a table and a plot.
+
+A ratio compares what was measured in the same repeat, minutes at most apart; its median over the repeats is the
+result and the range over the repeats its spread.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.contestants import CONTESTANTS
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A ratio of steps per second that is asked for."""
+
+    env: str
+    ours: str
+    theirs: str
+    at_least: float
+
+
+BARS = (
+    Bar("Hopper-v5", "inbounds-ppo-10", "sb3-ppo", 6.0),
+    Bar("HalfCheetah-v5", "inbounds-ppo-10", "sb3-ppo", 10.0),
+    Bar("Ant-v5", "inbounds-ppo-10", "sb3-ppo", 3.0),
+    Bar("Humanoid-v5", "inbounds-ppo-10", "sb3-ppo", 2.8),
+    Bar("Hopper-v5", "inbounds-trpo-10", "sb3-trpo", 5.0),
+)
+FLOOR_AIM = 0.75  # of the floor's steps per second
+MEMORY_BAR = 2e9  # bytes, of ten seeds on Humanoid
+
+Measurements = Mapping[str, Mapping[str, Sequence[Mapping[str, float]]]]
+"""By environment, then by contestant (or "floor"): one measurement per repeat."""
+
+
+def steps_per_second(results: Mapping[str, Any], env: str, name: str) -> NDArray[np.float64]:
+    """Return the rate of each repeat `[R]`; for "floor", of physics and arithmetic one after the other."""
+    turns = results["measurements"][env][name]
+    if name == "floor":
+        seconds = [
+            t["physics_seconds"] / t["steps"] + t["flops_per_step"] / t["flops_per_second"] for t in turns
+        ]
+        return 1 / np.array(seconds)
+    return np.array([t["steps"] / t["seconds"] for t in turns])
+
+
+def ratio(results: Mapping[str, Any], env: str, ours: str, theirs: str) -> NDArray[np.float64]:
+    """Return ours over theirs of each repeat, `[R]`."""
+    return steps_per_second(results, env, ours) / steps_per_second(results, env, theirs)
+
+
+def spread(values: NDArray[np.float64], digits: int = 2) -> str:
+    """Return "median (lowest to highest)".
+
+    Example:
+        >>> spread(np.array([3.0, 1.0, 2.0]), digits=1)
+        '2.0 (1.0 to 3.0)'
+    """
+    median, low, high = (f"{x:,.{digits}f}" for x in (np.median(values), values.min(), values.max()))
+    return f"{median} ({low} to {high})"
+
+
+def bars(results: Mapping[str, Any]) -> list[tuple[Bar, NDArray[np.float64]]]:
+    """Return each bar that was measured, with its ratios `[R]`."""
+    return [
+        (bar, ratio(results, bar.env, bar.ours, bar.theirs))
+        for bar in BARS
+        if {bar.ours, bar.theirs} <= results["measurements"].get(bar.env, {}).keys()
+    ]
+
+
+def markdown(results: Mapping[str, Any]) -> str:
+    """Return the report: ratios first, then rates, then how it was measured."""
+    lines = [
+        "# Speed",
+        "",
+        "Median (range) over the repeats. All rates are env steps per second on one core.",
+        "",
+    ]
+    lines += ["## Ratios", "", "| Environment | Ours | Over | Ratio | At least |", "|---|---|---|---|---|"]
+    for bar, values in bars(results):
+        verdict = "met" if np.median(values) >= bar.at_least else "**missed**"
+        ours, theirs = CONTESTANTS[bar.ours].label, CONTESTANTS[bar.theirs].label
+        lines.append(f"| {bar.env} | {ours} | {theirs} | {spread(values)} | {bar.at_least:g}: {verdict} |")
+    for env, measured in results["measurements"].items():
+        if {"inbounds-ppo-10", "floor"} <= measured.keys():
+            values = ratio(results, env, "inbounds-ppo-10", "floor")
+            lines.append(
+                f"| {env} | In Bounds PPO, 10 seeds | the floor | {spread(values)} | {FLOOR_AIM:g}: the aim |"
+            )
+    for env, measured in results["measurements"].items():
+        lines += ["", f"## {env}", "", "| Who | Steps/s | Over stable-baselines3 |", "|---|---|---|"]
+        for name in measured:
+            label = "the floor" if name == "floor" else CONTESTANTS[name].label
+            peer = "sb3-trpo" if "trpo" in name else "sb3-ppo"
+            relative = spread(ratio(results, env, name, peer)) if peer in measured else "–"
+            lines.append(f"| {label} | {spread(steps_per_second(results, env, name), 0)} | {relative} |")
+    lines += ["", "## How", "", *_how(results), ""]
+    return "\n".join(lines)
+
+
+def _how(results: Mapping[str, Any]) -> list[str]:
+    machine, work = results["machine"], results["work"]
+    lines = [
+        f"* {results['date']}, `{results['command']}`, {results['repeats']} interleaved repeats.",
+        f"* {machine['processor']}, {machine['cores']} cores, one used; load average before {machine['load']}.",
+        "* " + ", ".join(f"{name} {version}" for name, version in results["versions"].items()) + ".",
+        f"* Horizon {work['horizon']}, {work['num_epochs']} passes, minibatches of {work['minibatch_size']}, two "
+        f"networks of {' × '.join(map(str, work['hidden']))} tanh units, one thread each.",
+    ]
+    peak = max((t["peak_bytes"] for t in _memory_turns(results)), default=None)
+    if peak is not None:
+        lines.append(
+            f"* Peak memory of ten seeds on Humanoid: {peak / 1e9:.2f} GB (bar {MEMORY_BAR / 1e9:g} GB)."
+        )
+    lines += [f"* Not measured: {name} ({why})." for name, why in results["unavailable"].items()]
+    return lines
+
+
+def _memory_turns(results: Mapping[str, Any]) -> Sequence[Mapping[str, float]]:
+    return results["measurements"].get("Humanoid-v5", {}).get("inbounds-ppo-10", ())
+
+
+def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
+    """Return a figure, a panel per environment, and its alt text."""
+    import matplotlib.pyplot as plt
+
+    from inbounds.book import figures
+
+    figures.use_style()
+    envs = list(results["measurements"])
+    names = [n for n in CONTESTANTS if any(n in results["measurements"][env] for env in envs)]
+    height = 0.6 + len(envs) * (0.7 + 0.3 * len(names))
+    fig, axes = plt.subplots(len(envs), 1, figsize=(figures.WIDTH, height), sharex=True, squeeze=False)
+    for env, ax in zip(envs, axes[:, 0], strict=True):
+        for row, name in enumerate(names):
+            if name not in results["measurements"][env]:
+                continue
+            rate = steps_per_second(results, env, name)
+            middle = np.median(rate)
+            ours = name.startswith("inbounds")
+            ax.barh(row, middle, color=figures.SHADES[0] if ours else figures.SHADES[3])
+            error = [[middle - rate.min()], [rate.max() - middle]]
+            ax.errorbar(middle, row, xerr=error, color="#22272D", capsize=3)
+        if "floor" in results["measurements"][env]:
+            floor = np.median(steps_per_second(results, env, "floor"))
+            ax.axvline(floor, color=figures.SHADES[2], linestyle="--", label="the floor")
+            ax.legend(loc="lower right")
+        ax.set(yticks=range(len(names)), yticklabels=[CONTESTANTS[n].label for n in names], title=env)
+        ax.invert_yaxis()
+        ax.grid(axis="y", visible=False)
+    axes[-1, 0].set(xlabel="env steps per second, one core (log scale)", xscale="log")
+    facts = [
+        f"on {bar.env} {CONTESTANTS[bar.ours].label} is {np.median(values):.1f} times as fast as "
+        f"{CONTESTANTS[bar.theirs].label}"
+        for bar, values in bars(results)
+    ]
+    alt = (
+        "Bars of environment steps per second by contestant, a panel per environment: "
+        + "; ".join(facts)
+        + "."
+    )
+    return fig, alt
+
+
+def write(results: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Write `speed.json`, `speed.md` and `speed.svg`; return their paths."""
+    import matplotlib.pyplot as plt
+
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"speed.{suffix}" for suffix in ("json", "md", "svg")]
+    paths[0].write_text(json.dumps(results, indent=1) + "\n", encoding="utf8")
+    paths[1].write_text(markdown(results), encoding="utf8")
+    fig, alt = plot(results)
+    fig.savefig(paths[2], metadata={"Title": alt, "Date": None})
+    plt.close(fig)
+    return paths

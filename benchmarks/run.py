@@ -1,0 +1,274 @@
+"""Measure steps per second over environment, inference and update: this engine, its peers, and the floor.
+
+Each contestant is a process of its own; all are pinned to one core and take turns, one training epoch at a time, so
+that whatever else the machine does meets all alike. One turn warms up, the others count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import importlib.metadata
+import json
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from benchmarks.contestants import CONTESTANTS
+from benchmarks.report import markdown, write
+from benchmarks.work import ENVS, Work
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = (
+    "mujoco",
+    "gymnasium",
+    "torch",
+    "numpy",
+    "stable-baselines3",
+    "sb3-contrib",
+    "sbx-rl",
+    "jax",
+    "cleanrl",
+)
+EXAMPLES = """
+examples:
+  python -m benchmarks.run                                        everything; about fifteen minutes
+  python -m benchmarks.run --quick                                does it run? about a minute
+  python -m benchmarks.run --envs Hopper-v5 --contestants inbounds-ppo-10 sb3-ppo floor
+  python -m benchmarks.run --python sbx-ppo=peers/bin/python --python cleanrl-ppo=peers/bin/python
+
+peers of another stack:
+  SBX needs JAX. CleanRL's wheel asks for an older Python than it needs, and for older libraries. Give them an
+  environment of their own, with the versions of gymnasium, mujoco and torch that stand in constraints.txt:
+    python -m venv peers
+    peers/bin/pip install -c constraints.txt sbx-rl "gymnasium[mujoco]" torch
+    peers/bin/pip install --no-deps --ignore-requires-python cleanrl==1.2.0
+"""
+
+
+class Worker:
+    """A contestant's process.
+
+    Args:
+        name: of the contestant, or "floor".
+        work: what to do.
+        core: to be pinned to.
+        python: the interpreter.
+    """
+
+    def __init__(self, name: str, work: Work, core: int, python: str) -> None:
+        self.name = name
+        self._process = subprocess.Popen(
+            [python, "-m", "benchmarks.worker", name, json.dumps(dataclasses.asdict(work)), f"--core={core}"],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def ready(self) -> str | None:
+        """Wait until it has warmed up; return why it cannot take part, or None."""
+        message = self._answer()
+        return message.get("unavailable")
+
+    def turn(self) -> dict[str, float]:
+        """Let it train for one epoch; return what it measured."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("turn\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.communicate()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            _, errors = self._process.communicate()
+            return {
+                "unavailable": errors.strip().splitlines()[-1] if errors.strip() else "it ended in silence"
+            }
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+
+def measure(
+    envs: Sequence[str],
+    names: Sequence[str],
+    work: Work,
+    repeats: int,
+    core: int,
+    pythons: Mapping[str, str],
+    progress: Progress,
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Let all contestants take turns on each environment.
+
+    Args:
+        envs: Gymnasium's ids.
+        names: of the contestants, or "floor".
+        work: what to do; its `env` is replaced.
+        repeats: turns of each that count.
+        core: that all are pinned to.
+        pythons: interpreters by contestant; the others use this one.
+        progress: shows how far it is.
+
+    Returns:
+        Measurements by environment and contestant, and why some are absent, by contestant.
+    """
+    unavailable: dict[str, str] = {}
+    measurements: dict[str, Any] = {}
+    task = progress.add_task("", total=len(envs) * len(names) * (repeats + 1))
+    for env in envs:
+        workers = []
+        measurements[env] = {}
+        try:
+            for name in names:
+                progress.update(task, description=f"{env}: {name} warms up")
+                if name not in unavailable:
+                    python = pythons.get(name, sys.executable)
+                    workers.append(worker := Worker(name, dataclasses.replace(work, env=env), core, python))
+                    if (why := worker.ready()) is not None:
+                        unavailable[name] = why
+                        workers.pop().close()
+                progress.advance(task)
+            for repeat in range(repeats):
+                for worker in workers:
+                    progress.update(task, description=f"{env}: {worker.name}, repeat {repeat + 1}")
+                    measurements[env].setdefault(worker.name, []).append(worker.turn())
+                    progress.advance(task)
+            progress.advance(task, (len(names) - len(workers)) * repeats)
+        finally:
+            for worker in workers:
+                worker.close()
+    return measurements, unavailable
+
+
+def versions(pythons: Mapping[str, str]) -> dict[str, str]:
+    """Return the versions of the packages that matter, from this interpreter or from a peer's."""
+    code = (
+        "import importlib.metadata as m, json, sys\n"
+        "found = {}\n"
+        "for name in sys.argv[1:]:\n"
+        "    try: found[name] = m.version(name)\n"
+        "    except m.PackageNotFoundError: pass\n"
+        "print(json.dumps(found))"
+    )
+    found: dict[str, str] = {"python": platform.python_version()}
+    for python in dict.fromkeys([sys.executable, *pythons.values()]):
+        done = subprocess.run([python, "-c", code, *PACKAGES], capture_output=True, text=True, check=True)
+        found = json.loads(done.stdout) | found
+    return {name: found[name] for name in ("python", *PACKAGES) if name in found} | {
+        "inbounds": importlib.metadata.version("inbounds")
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Return what the numbers depend on."""
+    processor = platform.processor() or platform.machine()
+    if Path("/proc/cpuinfo").exists():
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf8").splitlines()
+        processor = next((x.split(":", 1)[1].strip() for x in lines if x.startswith("model name")), processor)
+    load = [round(x, 2) for x in os.getloadavg()]
+    return {"processor": processor, "cores": os.cpu_count(), "system": platform.system(), "load": load}
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Return the command line's choices, checked."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.run",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    everyone = ["floor", *CONTESTANTS]
+    parser.add_argument(
+        "--envs", nargs="+", default=list(ENVS), choices=ENVS, metavar="ENV", help=", ".join(ENVS)
+    )
+    parser.add_argument(
+        "--contestants",
+        nargs="+",
+        default=everyone,
+        choices=everyone,
+        metavar="NAME",
+        help=", ".join(everyone),
+    )
+    parser.add_argument("--repeats", type=int, default=5, help="turns of each contestant that count (5)")
+    parser.add_argument("--horizon", type=int, default=Work.horizon, help="env steps of a rollout (2048)")
+    parser.add_argument(
+        "--core", type=int, default=max(os.sched_getaffinity(0)), help="to pin all to (the last)"
+    )
+    parser.add_argument(
+        "--python", action="append", default=[], metavar="NAME=PATH", help="interpreter of one contestant"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "benchmarks" / "results", help="folder to write to"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="Hopper, 256 steps, one repeat; writes to …/quick"
+    )
+    chosen = parser.parse_args(arguments)
+    if chosen.quick:
+        chosen.envs, chosen.repeats, chosen.horizon = chosen.envs[:1], 1, 256
+        chosen.output = chosen.output / "quick"
+    if chosen.horizon % Work.minibatch_size:
+        parser.error(
+            f"--horizon must be a multiple of the minibatch, {Work.minibatch_size}; got {chosen.horizon}"
+        )
+    if chosen.core not in os.sched_getaffinity(0):
+        parser.error(f"--core {chosen.core} is not ours; choose one of {sorted(os.sched_getaffinity(0))}")
+    if chosen.repeats < 1:
+        parser.error("--repeats must be at least 1")
+    chosen.pythons = {}
+    for pair in chosen.python:
+        name, _, path = pair.partition("=")
+        if name not in everyone or not Path(path).exists():
+            parser.error(
+                f"--python takes NAME=PATH with a contestant and an interpreter that exists, got {pair!r}"
+            )
+        chosen.pythons[name] = str(Path(path).absolute())
+    return chosen
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure, write, and print the table."""
+    chosen = parse(arguments)
+    work = Work(env="", horizon=chosen.horizon)
+    # Read before the children add to it.
+    about = {"machine": machine(), "versions": versions(chosen.pythons)}
+    console = Console()
+    columns = (TextColumn("{task.description:44}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as progress:
+        measurements, unavailable = measure(
+            chosen.envs, chosen.contestants, work, chosen.repeats, chosen.core, chosen.pythons, progress
+        )
+    words = ["python", "-m", "benchmarks.run", *(sys.argv[1:] if arguments is None else arguments)]
+    results = {
+        "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+        "command": shlex.join(words),
+        **about,
+        "work": dataclasses.asdict(work),
+        "repeats": chosen.repeats,
+        "unavailable": unavailable,
+        "measurements": measurements,
+    }
+    paths = write(results, chosen.output)
+    console.print(Markdown(markdown(results)))
+    console.print(*(str(path) for path in paths))
+
+
+if __name__ == "__main__":
+    main()

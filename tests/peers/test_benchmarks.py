@@ -1,0 +1,146 @@
+"""The benchmark counts what it says it counts, and runs."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from torch.utils.flop_counter import FlopCounterMode
+
+from benchmarks import anatomy, report, run
+from benchmarks.contestants import CONTESTANTS, inbounds_config
+from benchmarks.floor import Floor
+from benchmarks.work import ENVS, Work, flops_per_step, multiply_adds
+
+
+def test_the_floor_counts_the_operations_of_the_networks() -> None:
+    """Against PyTorch's own counter, on one gradient step of the engine."""
+    from inbounds.learning import Trainer, ppo
+    from inbounds.learning.minibatches import minibatches
+
+    work = Work("Hopper-v5", horizon=128)
+    trainer = Trainer(inbounds_config(work, "ppo", 2, "gaussian"))
+    rollout = trainer.collector.collect(work.horizon)
+    shuffles = [np.random.default_rng(s) for s in range(2)]
+    batch = next(minibatches(rollout, rollout.reward, rollout.reward, work.minibatch_size, shuffles))
+    with FlopCounterMode(display=False) as counter:
+        ppo.loss(trainer.networks, batch, trainer.config.algorithm).backward()
+    policy, value = multiply_adds((11, 64, 64, 6)), multiply_adds((11, 64, 64, 1))
+    per_step = flops_per_step(work, obs_dim=11, act_dim=3)
+    learning = (per_step - 2 * (policy + value)) / work.num_epochs
+    # The engine writes the gradient of a bias as a sum, which the counter does not see; products are all there is.
+    assert counter.get_total_flops() == pytest.approx(2 * work.minibatch_size * learning, rel=1e-3)
+
+
+def test_the_replay_is_the_physics_that_was_recorded() -> None:
+    work = Work("Ant-v5", horizon=64)
+    floor = Floor(work, num_seeds=2)
+    assert floor.replay() > 0
+    batch, task = floor._batch, floor._task
+    batch.state[:] = floor.states[10]
+    task.ctrl[:] = floor.controls[10]
+    batch.step(nstep=task.frame_skip)
+    nq = task.qpos.shape[1]
+    time_and_pose = slice(0, 1 + nq)
+    alive = np.isclose(
+        floor.states[11][:, 0] - floor.states[10][:, 0], floor._task.dt
+    )  # not reset in between
+    assert alive.any()
+    np.testing.assert_array_equal(batch.state[alive, time_and_pose], floor.states[11][alive, time_and_pose])
+
+
+def made_up_results() -> dict:
+    turns = {
+        "inbounds-ppo-10": [{"steps": 100, "seconds": s, "peak_bytes": 1.5e9} for s in (1.0, 2.0, 4.0)],
+        "sb3-ppo": [{"steps": 10, "seconds": s, "peak_bytes": 1e9} for s in (1.0, 2.0, 8.0)],
+        "floor": [
+            {"steps": 100, "physics_seconds": 0.25, "flops_per_step": 500, "flops_per_second": 2e5}
+            for _ in range(3)
+        ],
+    }
+    return {
+        "date": "2026-01-01",
+        "command": "made up",
+        "machine": {"processor": "P", "cores": 2, "load": [0, 0, 0]},
+        "versions": {"torch": "2"},
+        "work": {"horizon": 2048, "num_epochs": 10, "minibatch_size": 64, "hidden": [64, 64]},
+        "repeats": 3,
+        "unavailable": {"sbx-ppo": "No module named 'sbx'"},
+        "measurements": {"Humanoid-v5": turns},
+    }
+
+
+def test_ratios_pair_what_was_measured_together() -> None:
+    results = made_up_results()
+    ratios = report.ratio(results, "Humanoid-v5", "inbounds-ppo-10", "sb3-ppo")
+    assert ratios.tolist() == [10.0, 10.0, 20.0]  # not the ratio of medians, 10 by accident of the last
+    assert np.allclose(report.steps_per_second(results, "Humanoid-v5", "floor"), 200.0)
+
+
+def test_the_report_leads_with_ratios_and_hides_nothing() -> None:
+    text = report.markdown(made_up_results())
+    assert text.index("## Ratios") < text.index("## Humanoid-v5")
+    assert "10.00 (10.00 to 20.00) | 2.8: met" in text
+    assert "1.50 GB" in text
+    assert "sbx-ppo (No module named 'sbx')" in text
+    slow = made_up_results()
+    for turn in slow["measurements"]["Humanoid-v5"]["inbounds-ppo-10"]:
+        turn["seconds"] *= 10
+    assert "2.8: **missed**" in report.markdown(slow)
+
+
+def test_every_bar_is_about_contestants_and_robots_there_are() -> None:
+    assert {bar.env for bar in report.BARS} == set(ENVS)
+    assert {name for bar in report.BARS for name in (bar.ours, bar.theirs)} <= CONTESTANTS.keys()
+
+
+def test_the_parts_of_an_epoch_add_up_and_none_is_missed() -> None:
+    import time
+
+    start = time.perf_counter()
+    parts = anatomy.anatomy(Work("Ant-v5", horizon=128), seeds=2, epochs=1)
+    assert sum(parts.values()) < 1e6 * (time.perf_counter() - start) / 256
+    expected = {
+        "robots: physics",
+        "robots: contact forces",
+        "acting: network",
+        "update: backward",
+        "update: Adam",
+    }
+    assert expected <= parts.keys()
+    assert min(parts.values()) > 0
+    assert parts["the rest"] < 0.2 * sum(parts.values())
+    from inbounds.learning import ppo
+
+    assert torch.autograd.grad.__module__ == "torch.autograd"  # the clocks are gone
+    assert ppo.loss.__module__ == "inbounds.learning.ppo"
+
+
+@pytest.mark.parametrize(
+    ("words", "fix"),
+    [
+        (["--horizon", "100"], "multiple of the minibatch"),
+        (["--core", "4096"], "choose one of"),
+        (["--python", "sb3-ppo=/nowhere"], "NAME=PATH"),
+        (["--repeats", "0"], "at least 1"),
+    ],
+)
+def test_a_wrong_choice_is_explained(words: list[str], fix: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        run.parse(words)
+    assert fix in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture) -> None:
+    names = ["floor", "inbounds-ppo-10", "sb3-ppo", "inbounds-trpo-1", "sb3-trpo", "sbx-ppo"]
+    run.main(["--quick", "--output", str(tmp_path), "--contestants", *names])
+    results = json.loads((tmp_path / "quick" / "speed.json").read_text())
+    measured = results["measurements"]["Hopper-v5"]
+    assert set(names) - set(results["unavailable"]) == set(measured)
+    assert set(results["unavailable"]) <= {"sbx-ppo"}
+    assert measured["inbounds-ppo-10"][0]["steps"] == 2560
+    assert all(turn["peak_bytes"] > 1e8 for turns in measured.values() for turn in turns)
+    assert "## Ratios" in (tmp_path / "quick" / "speed.md").read_text()
+    assert (tmp_path / "quick" / "speed.svg").stat().st_size > 1000
+    assert "Ratios" in capsys.readouterr().out
