@@ -40,7 +40,7 @@ class TrainingProgress:
     def __init__(self, epochs: int, console: Console | None = None) -> None:
         self.epochs = epochs
         # In a notebook too, plain lines: they can be read in the stored file.
-        self.console = console or Console(soft_wrap=True, highlight=False, force_jupyter=False)
+        self.console = console or Console(highlight=False, force_jupyter=False)
         self._returns: Any = None  # [S], of each seed the last one known
         self._recent: deque[tuple[float, int]] = deque(maxlen=20)  # (time, env steps of all seeds)
         self._last_line = -np.inf
@@ -76,7 +76,7 @@ class TrainingProgress:
 
     def say(self, text: str) -> None:
         """Write a line, above the bar."""
-        self.console.print(text, markup=False)
+        self.console.print(text, markup=False, soft_wrap=True)
 
     def _picture(self, text: str, done: int) -> Group:
         """The numbers, and a bar below them that is as wide as the terminal."""
