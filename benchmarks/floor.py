@@ -8,13 +8,12 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
 
 from benchmarks.contestants import inbounds_config
-from benchmarks.work import Work, flops_per_step
+from benchmarks.work import Work, flops_per_step, stopwatch
 
 MATMUL_SIZE = 768  # rows and columns: three such matrices fill most of a core's share of the cache
 
@@ -54,7 +53,7 @@ class Floor:
         trainer = Trainer(inbounds_config(work, "ppo", num_seeds, "gaussian"))
         trainer.epoch()  # the states of a policy that has learned a little
         recorder = Recorder(trainer.envs)
-        trainer.collector.envs = recorder  # type: ignore[assignment]
+        trainer.collector.envs = recorder
         rollout = trainer.collector.collect(work.horizon)
         self.states = np.stack(recorder.physics)  # [T, S, n]
         self.controls = rollout.action.numpy().swapaxes(0, 1).copy()  # [T, S, A]
@@ -66,32 +65,33 @@ class Floor:
         self._a = torch.randn(MATMUL_SIZE, MATMUL_SIZE)
         self._product = torch.empty_like(self._a)
 
-    def replay(self) -> float:
+    def replay(self) -> dict[str, float]:
         """Return the seconds that the physics of the recorded epoch takes."""
-        batch, task = self._batch, self._task
-        start = time.perf_counter()
+        batch, task, stop = self._batch, self._task, stopwatch()
         for state, control in zip(self.states, self.controls, strict=True):
             batch.state[:] = state
             task.ctrl[:] = control
             batch.step(nstep=task.frame_skip)
             task.feel_contacts()
-        return time.perf_counter() - start
+        return stop()
 
-    def matmul_rate(self, seconds: float = 0.3) -> float:
-        """Return the floating-point operations per second of a large float32 matrix product."""
+    def multiply(self, count: int = 40) -> dict[str, float]:
+        """Return the seconds that the arithmetic of the epoch would take, at the rate of large matrix products."""
         import torch
 
-        count, start = 0, time.perf_counter()
-        while (elapsed := time.perf_counter() - start) < seconds:
+        stop = stopwatch()
+        for _ in range(count):
             torch.mm(self._a, self._a, out=self._product)
-            count += 1
-        return count * 2 * MATMUL_SIZE**3 / elapsed
+        share = self.num_steps * self.flops_per_step / (count * 2 * MATMUL_SIZE**3)
+        return {clock: share * seconds for clock, seconds in stop().items()}
 
     def turn(self) -> dict[str, float]:
-        """Return one measurement."""
+        """Return one measurement: physics and arithmetic, one after the other."""
+        physics, arithmetic = self.replay(), self.multiply()
         return {
             "steps": self.num_steps,
-            "physics_seconds": self.replay(),
-            "flops_per_step": self.flops_per_step,
-            "flops_per_second": self.matmul_rate(),
+            **{clock: physics[clock] + arithmetic[clock] for clock in physics},
+            "physics_seconds": physics["seconds"],
+            "flops": self.num_steps * self.flops_per_step,
+            "flops_per_second": self.num_steps * self.flops_per_step / arithmetic["seconds"],
         }

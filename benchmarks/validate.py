@@ -114,7 +114,9 @@ def train_peer(job: Job, on_epoch: Callable[[], None]) -> None:
     epochs = Epochs()
     model = PPO("MlpPolicy", make_vec_env(job.env, seed=seed), n_steps=job.horizon, seed=seed, device="cpu")
     model.learn(job.epochs * job.horizon, callback=epochs)
-    job.keep(seed, [np.mean(r) if r else np.nan for r in epochs.finished], [len(r) for r in epochs.finished])
+    job.keep(
+        seed, [float(np.mean(r)) if r else np.nan for r in epochs.finished], [len(r) for r in epochs.finished]
+    )
 
 
 def work_off(job: Job) -> None:

@@ -12,7 +12,6 @@ import json
 import os
 import resource
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -35,13 +34,14 @@ def measurer(name: str, work: Any) -> Callable[[], dict[str, Any]]:
 
         return Floor(work).turn
     from benchmarks.contestants import CONTESTANTS
+    from benchmarks.work import stopwatch
 
     turn = CONTESTANTS[name].start(work)
 
     def measure() -> dict[str, Any]:
-        start = time.perf_counter()
+        stop = stopwatch()
         steps = turn()
-        return {"steps": steps, "seconds": time.perf_counter() - start}
+        return {"steps": steps, **stop()}
 
     return measure
 
