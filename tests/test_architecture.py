@@ -50,7 +50,7 @@ def test_imports_go_one_way(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "statement", ["import inbounds", "import inbounds.distributions", "import inbounds.robots"]
+    "statement", [f"import inbounds{room}" for room in ("", ".distributions", ".robots", ".learning")]
 )
 def test_importing_is_light(statement: str) -> None:
     heavy = ["IPython", "jupyter_core", "ipykernel", "bokeh", "mediapy", "matplotlib"]

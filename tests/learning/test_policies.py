@@ -3,6 +3,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.learning import FAMILIES, Parameters, Policy, PolicyConfig, executed_std
@@ -66,16 +67,19 @@ def test_greedy_actions_are_those_of_the_law_over_actions(family: str) -> None:
     rows = torch.tensor([[0.4, -0.2, 0.1, -0.6]], dtype=torch.float64)  # outputs of two action dimensions
     bound = policy(family)
     law = action_law(family, bound.parameters(rows))
-    assert ("median" in bound.family.greedy) == (family != "beta")
+    assert set(bound.family.greedy) == {"mean", "median", "mode"}
     for by in bound.family.greedy:
-        centre = law.median if family == "gaussian" else getattr(law, by)
-        expected = bound.centre + bound.half_range * centre.numpy()
+        if family == "beta" and by == "median":  # torch has none: SciPy's, on the unit interval
+            centre = 2 * stats.beta.median(law.concentration1, law.concentration0) - 1
+        else:
+            centre = (law.median if family == "gaussian" else getattr(law, by)).numpy()
+        expected = bound.centre + bound.half_range * centre
         assert np.allclose(bound.greedy(rows, by), expected, atol=1e-12)
 
 
 def test_an_unknown_greedy_action_is_refused_with_the_choices() -> None:
-    with pytest.raises(ValueError, match="beta offers the greedy actions mean, mode, not 'median'"):
-        policy("beta").greedy(torch.zeros(4), "median")
+    with pytest.raises(ValueError, match="beta offers the greedy actions mean, median, mode, not 'best'"):
+        policy("beta").greedy(torch.zeros(4), "best")
 
 
 @pytest.mark.parametrize("family", NAMES)

@@ -126,8 +126,8 @@ class Watch:
 
     run: Annotated[Positional[Path], arg(metavar="RUN")]
     """Run directory, or the file policies.safetensors of one."""
-    greedy: Greedy | None = None
-    """How to act. None is the median; for a family that does not offer it, the mean."""
+    greedy: Greedy = "median"
+    """How to act."""
     seed_index: int = 0
     """Which of the run's seeds, 0 the first."""
     seconds: float = 10.0

@@ -27,7 +27,7 @@ def run(command: Watch) -> int:
         CommandError: no such run or seed, nothing to draw with, no room; the message names the fix.
     """
     policy = _choose(command)
-    greedy = command.greedy or policy.default_greedy
+    greedy = command.greedy
     path = command.out or (
         (command.run if command.run.is_dir() else command.run.parent) / f"{greedy}-seed{policy.seed}.mp4"
     )
@@ -92,10 +92,4 @@ def _choose(command: Watch) -> TrainedPolicy:
             else "all seeds did: train anew"
         )
         raise CommandError(f"seed {policy.seed} diverged in training: {instead}")
-    if command.greedy is not None and command.greedy not in policy.greedy_choices:
-        raise CommandError(
-            f"{policy.config.policy.family} does not act by {command.greedy}: "
-            f"choose --greedy {', '.join(policy.greedy_choices)}",
-            2,
-        )
     return policy

@@ -11,6 +11,8 @@ from inbounds.learning.policies import FAMILIES, Family, Policy, PolicyConfig
 from inbounds.learning.policy_gradient import PolicyGradientConfig
 from inbounds.learning.ppo import PPOConfig
 from inbounds.learning.rollout import Collector, Rollout
+from inbounds.learning.run_store import load_policies, load_policy, policies_of, read_curves, save_run
+from inbounds.learning.trained_policy import TrainedPolicy
 from inbounds.learning.training import DivergedSeedWarning, Trainer, train
 from inbounds.learning.trpo import TRPOConfig
 
@@ -33,11 +35,17 @@ __all__ = [
     "SeedLinear",
     "TRPOConfig",
     "TrainConfig",
+    "TrainedPolicy",
     "Trainer",
     "executed_std",
     "gae",
+    "load_policies",
+    "load_policy",
     "mlp",
     "normalize_advantage",
+    "policies_of",
     "preset",
+    "read_curves",
+    "save_run",
     "train",
 ]

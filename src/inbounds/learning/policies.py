@@ -9,9 +9,9 @@ r"""The policy families: a law for the latent and a map to the action.
 
 One affine map then takes [−1, 1] to the box [low, high]. Ratio, score, KL divergence and Fisher information are
 invariant under a fixed bijection, so an algorithm sees the law only: logit-normal PPO *is* Gaussian PPO with another
-map. Not invariant are the entropy and the greedy actions: each family offers mean, median and mode, but for `beta`
-the median. Entropies are in nats and of unit actions: in units of the robot's action each dimension adds the
-constant log of half its range, which no gradient sees.
+map. Not invariant are the entropy and the greedy actions: each family offers mean, median and mode.
+Entropies are in nats and of unit actions: in units of the robot's action each dimension adds the constant log of
+half its range, which no gradient sees.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.special import betaincinv
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
@@ -124,6 +125,13 @@ def beta_entropy(parameters: Parameters) -> Tensor:
     return entropy.sum(-1).to(parameters.first.dtype)
 
 
+def beta_median(parameters: Parameters) -> Tensor:
+    """Return the medians `[..., A]` of unit actions 2x − 1, by SciPy: torch has no inverse of the incomplete beta."""
+    alpha, beta = (x.detach().double() for x in parameters)
+    half = torch.from_numpy(np.asarray(betaincinv(alpha.numpy(), beta.numpy(), 0.5)))
+    return (2 * half - 1).to(parameters.first.dtype)
+
+
 def _logit_normal(parameters: Parameters) -> LogitNormal:
     return LogitNormal(parameters.first, parameters.second.exp(), -1.0, 1.0, validate_args=False)
 
@@ -155,6 +163,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
             entropy=beta_entropy,
             greedy={
                 "mean": lambda p: laws.scaled_beta(p).mean,
+                "median": beta_median,
                 "mode": lambda p: laws.scaled_beta(p).mode,
             },
         ),

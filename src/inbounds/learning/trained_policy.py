@@ -85,19 +85,15 @@ class TrainedPolicy:
         """Ways to act: what the family offers of mean, median and mode, and sample."""
         return (*self._policy.family.greedy, "sample")
 
-    @property
-    def default_greedy(self) -> str:
-        """The median, the one greedy action that a change of variables leaves alone; the mean where there is none."""
-        return "median" if "median" in self.greedy_choices else "mean"
-
     def act(
-        self, obs: NDArray[Any], greedy: str | None = None, rng: np.random.Generator | None = None
+        self, obs: NDArray[Any], greedy: str = "median", rng: np.random.Generator | None = None
     ) -> NDArray[Any]:
         """Return actions for observations, both as the environment has them.
 
         Args:
             obs: `[O]` or `[B, O]`.
-            greedy: "mean", "median", "mode" or "sample", of `greedy_choices`; None is `default_greedy`.
+            greedy: "mean", "median", "mode" or "sample", of `greedy_choices`. Of the first three the median alone is
+                left in place by a change of variables.
             rng: where "sample" draws from; None is a generator seeded by the system.
 
         Returns:
@@ -115,14 +111,14 @@ class TrainedPolicy:
         batch = np.atleast_2d(obs)  # [B, O]
         seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
         outputs = self._network.act(seen)  # [B, 2A]: the weights of one seed serve every row
-        way = greedy or self.default_greedy
-        if way == "sample":
+        if greedy == "sample":
             action = self._sample(outputs, np.random.default_rng() if rng is None else rng)
-        elif way in self.greedy_choices:
-            action = self._policy.greedy(torch.from_numpy(outputs), way)
+        elif greedy in self.greedy_choices:
+            action = self._policy.greedy(torch.from_numpy(outputs), greedy)
         else:
             raise ValueError(
-                f"{self.config.policy.family} does not act by {way!r}: choose one of {', '.join(self.greedy_choices)}"
+                f"{self.config.policy.family} does not act by {greedy!r}: "
+                f"choose one of {', '.join(self.greedy_choices)}"
             )
         return action.astype(self.low.dtype).reshape(*obs.shape[:-1], -1)
 

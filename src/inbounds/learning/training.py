@@ -20,7 +20,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import gymnasium
 import numpy as np
@@ -35,6 +35,9 @@ from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 from inbounds.robots.registration import TASK_NAMES
 from inbounds.robots.registration import make as make_robots
+
+if TYPE_CHECKING:
+    from inbounds.learning.trained_policy import TrainedPolicy
 
 Record: TypeAlias = dict[str, Any]
 """One epoch: `epoch`, `env_steps` (per seed, so far), `seconds` of wall time, and arrays `[S]` by name."""
@@ -114,6 +117,13 @@ class Trainer:
                 stacklevel=3,
             )
         self.diverged |= now
+
+    @property
+    def policies(self) -> list[TrainedPolicy]:
+        """What has been learned so far, one policy per seed, ready to act without the trainer."""
+        from inbounds.learning.run_store import policies_of  # imports this module
+
+        return policies_of(self)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the future depends on, and the records so far."""
