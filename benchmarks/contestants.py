@@ -176,24 +176,24 @@ def cleanrl(work: Work) -> Turn:
 
 
 CONTESTANTS: dict[str, Contestant] = {
-    "inbounds-ppo-10": Contestant("In Bounds PPO, 10 seeds", inbounds("ppo", 10), "inbounds", "PPO", 10),
-    "inbounds-ppo-1": Contestant("In Bounds PPO, 1 seed", inbounds("ppo", 1), "inbounds", "PPO"),
+    "inbounds-ppo-10": Contestant("In Bounds PPO, S = 10", inbounds("ppo", 10), "inbounds", "PPO", 10),
+    "inbounds-ppo-1": Contestant("In Bounds PPO, S = 1", inbounds("ppo", 1), "inbounds", "PPO"),
     "inbounds-logit-normal-10": Contestant(
-        "In Bounds PPO, logit-normal, 10 seeds", inbounds("ppo", 10, "logit-normal"), "inbounds", "PPO", 10
+        "… logit-normal, S = 10", inbounds("ppo", 10, "logit-normal"), "inbounds", "PPO", 10
     ),
     "sb3-ppo": Contestant(
         "stable-baselines3 PPO", stable_baselines("stable_baselines3", "PPO"), "stable_baselines3", "PPO"
     ),
     "sb3-ppo-plain": Contestant(
-        "stable-baselines3 PPO, no normalisation",
+        "… observations as they are",
         stable_baselines("stable_baselines3", "PPO", normalize=False),
         "stable_baselines3",
         "PPO",
     ),
     "sbx-ppo": Contestant("SBX PPO", stable_baselines("sbx", "PPO"), "sbx", "PPO"),
     "cleanrl-ppo": Contestant("CleanRL PPO", cleanrl, "cleanrl", "PPO"),
-    "inbounds-trpo-10": Contestant("In Bounds TRPO, 10 seeds", inbounds("trpo", 10), "inbounds", "TRPO", 10),
-    "inbounds-trpo-1": Contestant("In Bounds TRPO, 1 seed", inbounds("trpo", 1), "inbounds", "TRPO"),
+    "inbounds-trpo-10": Contestant("In Bounds TRPO, S = 10", inbounds("trpo", 10), "inbounds", "TRPO", 10),
+    "inbounds-trpo-1": Contestant("In Bounds TRPO, S = 1", inbounds("trpo", 1), "inbounds", "TRPO"),
     "sb3-trpo": Contestant(
         "sb3-contrib TRPO", stable_baselines("sb3_contrib", "TRPO"), "sb3_contrib", "TRPO"
     ),

@@ -149,26 +149,28 @@ def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
     figures.use_style()
     envs = list(results["measurements"])
     names = [n for n in CONTESTANTS if any(n in results["measurements"][env] for env in envs)]
-    height = 0.6 + len(envs) * (0.7 + 0.3 * len(names))
+    height = 0.7 + len(envs) * (0.6 + 0.28 * len(names))
     fig, axes = plt.subplots(len(envs), 1, figsize=(figures.WIDTH, height), sharex=True, squeeze=False)
     for env, ax in zip(envs, axes[:, 0], strict=True):
         for row, name in enumerate(names):
-            if name not in results["measurements"][env]:
-                continue
-            rate = steps_per_second(results, env, name)
-            middle = np.median(rate)
-            ours = name.startswith("inbounds")
-            ax.barh(row, middle, color=figures.SHADES[0] if ours else figures.SHADES[3])
-            error = [[middle - rate.min()], [rate.max() - middle]]
-            ax.errorbar(middle, row, xerr=error, color="#22272D", capsize=3)
+            if name in results["measurements"][env]:
+                rate = steps_per_second(results, env, name)
+                ours = name.startswith("inbounds")
+                color, marker = (figures.SHADES[0], "o") if ours else (figures.SHADES[3], "s")
+                ax.plot([rate.min(), rate.max()], [row, row], color=color, linestyle="-")
+                ax.plot(np.median(rate), row, color=color, marker=marker, markersize=8)
         if "floor" in results["measurements"][env]:
             floor = np.median(steps_per_second(results, env, "floor"))
-            ax.axvline(floor, color=figures.SHADES[2], linestyle="--", label="the floor")
-            ax.legend(loc="lower right")
-        ax.set(yticks=range(len(names)), yticklabels=[CONTESTANTS[n].label for n in names], title=env)
-        ax.invert_yaxis()
-        ax.grid(axis="y", visible=False)
-    axes[-1, 0].set(xlabel="env steps per second, one core (log scale)", xscale="log")
+            ax.axvline(floor, color=figures.SHADES[2], linestyle="--")
+            ax.text(floor, -0.9, "the floor ", color=figures.SHADES[2], ha="right", va="center")
+        ax.set(
+            yticks=range(len(names)),
+            yticklabels=[CONTESTANTS[n].label for n in names],
+            ylim=(len(names) - 0.5, -1.4),
+        )
+        ax.set_title(env, loc="left")
+        ax.set(xscale="log")
+    axes[-1, 0].set_xlabel("env steps per second", loc="right")
     facts = [
         f"on {bar.env} {CONTESTANTS[bar.ours].label} is {np.median(values):.1f} times as fast as "
         f"{CONTESTANTS[bar.theirs].label}"
