@@ -1,8 +1,9 @@
 """Does Gaussian PPO learn here what it learns in stable-baselines3? Learning curves side by side.
 
 Both sides run stable-baselines3's defaults: one free σ per dimension, ε = 0.2, no entropy bonus, observations as they
-are, returns in training per epoch of 2048 steps. The areas under the curves are compared by two one-sided tests: are
-the means within 15 % of the peer's? What is finished is kept: an interrupted validation goes on where it was.
+are (or, asked for, normalised), returns in training per epoch of 2048 steps. The areas under the curves are compared
+by two one-sided tests: are the means within 15 % of the peer's? What is finished is kept: an interrupted validation
+goes on where it was.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmarks.equivalence import area, equivalence
+from benchmarks.equivalence import area, equivalence, seeds_needed
 from benchmarks.run import machine, versions
 from benchmarks.worker import THREADS
 
@@ -49,11 +50,18 @@ class Job:
     seeds: tuple[int, ...]
     epochs: int
     horizon: int
+    normalize: bool
     folder: Path
+
+    @property
+    def name(self) -> str:
+        """Of its files: what its curves depend on, but for the seed."""
+        seen = "normalized" if self.normalize else "raw"
+        return f"{self.env}-{self.who}-{self.epochs}x{self.horizon}-{seen}"
 
     def curve_file(self, seed: int) -> Path:
         """Return where a finished seed's curve lies."""
-        return self.folder / "runs" / f"{self.env}-{self.who}-{self.epochs}x{self.horizon}-{seed}.parquet"
+        return self.folder / "runs" / f"{self.name}-{seed}.parquet"
 
     def keep(self, seed: int, returns: Sequence[float], episodes: Sequence[int]) -> None:
         """Write a finished seed's curve, whole or not at all."""
@@ -79,10 +87,10 @@ def train_ours(job: Job, on_epoch: Callable[[], None]) -> None:
         config,
         policy=dataclasses.replace(config.policy, state_dependent_std=False),
         algorithm=dataclasses.replace(config.algorithm, entropy_coef=0.0, horizon=job.horizon),
-        normalize_obs=False,
+        normalize_obs=job.normalize,
     )
-    name = f"{job.env}-{job.epochs}x{job.horizon}-{'-'.join(map(str, job.seeds))}"
-    run = train(config, run_dir=job.folder / "runs" / name, callback=lambda *_: on_epoch())
+    run_dir = job.folder / "runs" / f"{job.name}-{'-'.join(map(str, job.seeds))}"
+    run = train(config, run_dir=run_dir, callback=lambda *_: on_epoch())
     if run.diverged.any():
         raise RuntimeError(f"{job.env}: seeds {np.array(job.seeds)[run.diverged].tolist()} diverged")
     for i, seed in enumerate(job.seeds):
@@ -94,6 +102,7 @@ def train_peer(job: Job, on_epoch: Callable[[], None]) -> None:
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.env_util import make_vec_env
+    from stable_baselines3.common.vec_env import VecNormalize
 
     class Epochs(BaseCallback):
         def __init__(self) -> None:
@@ -112,7 +121,10 @@ def train_peer(job: Job, on_epoch: Callable[[], None]) -> None:
 
     (seed,) = job.seeds
     epochs = Epochs()
-    model = PPO("MlpPolicy", make_vec_env(job.env, seed=seed), n_steps=job.horizon, seed=seed, device="cpu")
+    envs: Any = make_vec_env(job.env, seed=seed)
+    if job.normalize:
+        envs = VecNormalize(envs, norm_reward=False)
+    model = PPO("MlpPolicy", envs, n_steps=job.horizon, seed=seed, device="cpu")
     model.learn(job.epochs * job.horizon, callback=epochs)
     job.keep(
         seed, [float(np.mean(r)) if r else np.nan for r in epochs.finished], [len(r) for r in epochs.finished]
@@ -137,15 +149,16 @@ def _share(counter: Any) -> None:
     _epochs_done = counter
 
 
-def jobs(envs: Sequence[str], num_seeds: int, epochs: int, horizon: int, folder: Path) -> list[Job]:
-    """Return what is still to be done, the longest first."""
+def jobs(whole: Sequence[Job]) -> list[Job]:
+    """Return what of these jobs is still to be done, split as it is trained, the longest first.
+
+    Our seeds are trained in lockstep by one process, the peer's each by one of its own.
+    """
     todo = []
-    for env in envs:
-        for who in (OURS, PEER):
-            whole = Job(env, who, tuple(range(num_seeds)), epochs, horizon, folder)
-            missing = tuple(s for s in whole.seeds if not whole.curve_file(s).exists())
-            groups = [missing] if who == OURS and missing else [(s,) for s in missing]
-            todo += [dataclasses.replace(whole, seeds=seeds) for seeds in groups]
+    for job in whole:
+        missing = tuple(s for s in job.seeds if not job.curve_file(s).exists())
+        groups = [missing] if job.who == OURS and missing else [(s,) for s in missing]
+        todo += [dataclasses.replace(job, seeds=seeds) for seeds in groups]
     return sorted(todo, key=lambda job: len(job.seeds), reverse=True)
 
 
@@ -190,6 +203,7 @@ def judge(table: pa.Table, env: str, margin: float) -> dict[str, Any]:
     }
     try:
         verdict |= dataclasses.asdict(equivalence(areas[OURS], areas[PEER], margin))
+        verdict["seeds_needed"] = seeds_needed(areas[OURS], areas[PEER], margin)
     except ValueError as error:
         verdict["undecided"] = str(error)
     return verdict
@@ -230,12 +244,11 @@ def plot(table: pa.Table, verdicts: dict[str, Any]) -> tuple[Any, str]:
     )
 
 
-def finish(done: Sequence[Job], folder: Path, margin: float) -> dict[str, Any]:
+def finish(done: Sequence[Job], margin: float) -> dict[str, Any]:
     """Gather the curves, judge, and write `curves.parquet`, `validation.json` and `validation.svg`.
 
     Args:
         done: jobs whose seeds are all finished, one per robot and side.
-        folder: to write to.
         margin: relative.
 
     Returns:
@@ -243,6 +256,7 @@ def finish(done: Sequence[Job], folder: Path, margin: float) -> dict[str, Any]:
     """
     import matplotlib.pyplot as plt
 
+    folder = done[0].folder
     table = pa.concat_tables([pq.read_table(job.curve_file(seed)) for job in done for seed in job.seeds])
     pq.write_table(table, folder / "curves.parquet")
     verdicts = {env: judge(table, env, margin) for env in dict.fromkeys(job.env for job in done)}
@@ -252,6 +266,7 @@ def finish(done: Sequence[Job], folder: Path, margin: float) -> dict[str, Any]:
         "versions": versions({}),
         "seeds": len(done[0].seeds),
         "env_steps": done[0].epochs * done[0].horizon,
+        "normalize_obs": done[0].normalize,
         "margin": margin,
         "verdicts": verdicts,
     }
@@ -273,6 +288,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--envs", nargs="+", default=["Hopper-v5", "HalfCheetah-v5"], help="Gymnasium's ids")
     parser.add_argument("--seeds", type=int, default=10, help="of each side (10)")
     parser.add_argument("--epochs", type=int, default=150, help="of 2048 steps each (150)")
+    parser.add_argument(
+        "--normalize", action="store_true", help="observations, by running statistics, on both sides"
+    )
     parser.add_argument("--margin", type=float, default=0.15, help="relative, of equivalence (0.15)")
     parser.add_argument(
         "--workers", type=int, default=len(os.sched_getaffinity(0)), help="processes, one thread each"
@@ -290,15 +308,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error("at least two seeds a side, one epoch and one worker are needed")
     (chosen.output / "runs").mkdir(parents=True, exist_ok=True)
     console = Console()
-    if todo := jobs(chosen.envs, chosen.seeds, chosen.epochs, horizon, chosen.output):
-        run_jobs(todo, chosen.workers, console)
-    seeds = tuple(range(chosen.seeds))
-    done = [
-        Job(env, who, seeds, chosen.epochs, horizon, chosen.output)
+    sides = [
+        Job(env, who, tuple(range(chosen.seeds)), chosen.epochs, horizon, chosen.normalize, chosen.output)
         for env in chosen.envs
         for who in (OURS, PEER)
     ]
-    results = finish(done, chosen.output, chosen.margin)
+    if todo := jobs(sides):
+        run_jobs(todo, chosen.workers, console)
+    results = finish(sides, chosen.margin)
     for env, verdict in results["verdicts"].items():
         if "undecided" in verdict:
             console.print(f"{env}: undecided: {verdict['undecided']}")

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from benchmarks import validate
-from benchmarks.equivalence import area, equivalence
+from benchmarks.equivalence import area, equivalence, seeds_needed
 
 
 def test_against_a_peer_without_noise_it_is_two_one_sample_tests() -> None:
@@ -37,6 +37,14 @@ def test_the_verdict_is_the_interval_within_the_margin() -> None:
         outcome = equivalence(rng.normal(ratio * 50, 4, 10), rng.normal(50, 4, 10))
         assert outcome.equivalent == (outcome.low > 0.85 and outcome.high < 1.15)
         assert outcome.low < outcome.ratio < outcome.high
+
+
+def test_with_the_seeds_needed_it_succeeds_in_eight_of_ten_cases() -> None:
+    rng = np.random.default_rng(3)
+    n = seeds_needed(*100 + 20 * rng.normal(size=(2, 10_000)))
+    assert 28 <= n <= 33
+    verdicts = [equivalence(*100 + 20 * rng.normal(size=(2, n))).equivalent for _ in range(300)]
+    assert 0.7 < np.mean(verdicts) < 0.9
 
 
 def test_it_says_when_there_is_nothing_to_compare_with() -> None:
@@ -69,5 +77,9 @@ def test_a_quick_validation_judges_and_is_not_run_twice(tmp_path, capsys, monkey
     assert "Hopper-v5" in capsys.readouterr().out
     (missing,) = folder.glob(f"runs/Hopper-v5-{validate.PEER}-*-1.parquet")
     missing.unlink()
-    (job,) = validate.jobs(["Hopper-v5"], 2, 2, 256, folder)
+    sides = [
+        validate.Job("Hopper-v5", who, (0, 1), 2, 256, False, folder)
+        for who in (validate.OURS, validate.PEER)
+    ]
+    (job,) = validate.jobs(sides)
     assert (job.who, job.seeds) == (validate.PEER, (1,))
