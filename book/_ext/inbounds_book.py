@@ -3,19 +3,22 @@
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one.
-* Docstrings are read the way they are written (see ``shield`` and ``restore``).
+* Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
 import os
+import pydoc
 import re
 import shutil
 from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.config import Config
+from sphinx.environment import BuildEnvironment
 
 from inbounds.book import explorables
 
@@ -74,6 +77,29 @@ def restore(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: li
             lines[i] = "".join(part if part.startswith("`") else part.replace("|", r"\|") for part in parts)
 
 
+def resolve_public_name(
+    app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: nodes.TextElement
+) -> nodes.Node | None:
+    """Link a name of ours that an annotation writes short, or by the module in which it is defined.
+
+    The API page documents ``inbounds.learning.Collector``; an annotation says ``Collector``, or names its module too.
+    """
+    if node.get("refdomain") != "py":
+        return None
+    target = node["reftarget"]
+    domain = env.get_domain("py")
+    known = [name for name in domain.objects if name.rpartition(".")[2] == target.rpartition(".")[2]]
+    if "." in target:
+        known = [
+            name
+            for name in known
+            if pydoc.locate(name) is not None and pydoc.locate(name) is pydoc.locate(target)
+        ]
+    if len(known) != 1:
+        return None
+    return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", known[0], node, contnode)
+
+
 def is_thebe(script: Any) -> bool:
     """Whether a script tag comes from sphinx-thebe: its file, or its inline settings."""
     attributes = getattr(script, "attributes", {})
@@ -86,5 +112,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("html-page-context", choose_scripts, priority=900)
     app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500
     app.connect("autodoc-process-docstring", restore, priority=600)
+    app.connect("missing-reference", resolve_public_name)
     app.connect("build-finished", copy_explorables)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -182,7 +182,7 @@ def train(
         callback: called after every epoch with the trainer and the record: a progress bar, a logger.
 
     Returns:
-        The finished run: `records`, `networks`, `diverged`, `collector`.
+        The trainer, its run finished, with `records`, `networks`, `diverged`, `collector`.
 
     Raises:
         ValueError: the run directory belongs to another configuration.
