@@ -1,0 +1,380 @@
+"""One cell, from its last checkpoint to its file in the results, in this process.
+
+The loop is the one of `inbounds.learning.train`, plus measurements every tenth epoch, which must be in the same
+checkpoint as the epoch that they belong to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import safetensors
+from numpy.typing import NDArray
+
+from inbounds.learning import DivergedSeedWarning, Limits, Rollout, Trainer, checkpoint
+from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.run_store import load_checkpoint, save_policies
+from inbounds.study import store
+from inbounds.study.claim import Claim
+from inbounds.study.evaluate import GreedyEvaluation, evaluate_finally
+from inbounds.study.grid import STUDY_VERSION, Cell
+from inbounds.study.provenance import provenance
+from inbounds.study.store import StudyFolder
+
+MEASURE_EVERY = 10  # epochs
+FIRST_STEPS = 16  # whose rewards are kept, to compare with on other machines
+PREVIOUS = "previous"  # folder of the checkpoint before the last
+Outcome = Literal["finished", "stopped", "was finished"]
+
+
+class StudyError(RuntimeError):
+    """A cell cannot go on; the message says what to do."""
+
+
+class DiskFullError(StudyError):
+    """There is no room: no other cell could go on either."""
+
+
+def run_cell(
+    cell: Cell,
+    folder: StudyFolder,
+    *,
+    stop: Callable[[], bool] = lambda: False,
+    deadline: float = float("inf"),
+) -> Outcome:
+    """Run a cell, going on from its last checkpoint, until it is finished or shall stop.
+
+    Args:
+        cell: which.
+        folder: where results and work are.
+        stop: asked after every epoch; True saves a checkpoint and returns.
+        deadline: `time.time()` that no epoch shall end after, by the last one's length.
+
+    Returns:
+        "finished", "stopped", or "was finished" already.
+
+    Raises:
+        ClaimedError: another process runs the cell.
+        DiskFullError: there is no room for a checkpoint or the results.
+        StudyError: what is there is damaged or belongs to another configuration.
+
+    Example:
+        >>> import tempfile
+        >>> small = (("horizon", 64), ("minibatch_size", 32), ("num_epochs", 1))
+        >>> cell = Cell("test", "ppo", "beta", "Swimmer", seeds=(0, 1), epochs=10, overrides=small)
+        >>> with tempfile.TemporaryDirectory() as name:
+        ...     folder = StudyFolder(Path(name, "results"), Path(name, "work"))
+        ...     run_cell(cell, folder), run_cell(cell, folder), store.read_cell(folder.cell_file(cell)).num_rows
+        ('finished', 'was finished', 20)
+    """
+    if _is_finished(cell, folder):
+        return "was finished"
+    try:
+        with Claim.take(folder.work_of(cell)) as claim:
+            if _is_finished(cell, folder):  # by whoever had the claim a moment ago
+                return "was finished"
+            return _CellRun(cell, folder, claim).run(stop, deadline)
+    except (OSError, RuntimeError, safetensors.SafetensorError, pa.ArrowException) as error:
+        if is_disk_full(error):
+            raise DiskFullError(
+                f"{cell.id}: the disk is full. The last checkpoint is kept; make room (df -h {folder.work}) "
+                "and run the study again"
+            ) from error
+        raise
+
+
+def _is_finished(cell: Cell, folder: StudyFolder) -> bool:
+    """Whether nothing is left to do; raises where something is in the way."""
+    state, path = folder.state(cell), folder.cell_file(cell)
+    if state == "damaged":
+        raise StudyError(
+            f"{path}, or a file or checksum that goes with it, is damaged: {store.restore(path)}"
+        )
+    if state == "another configuration":
+        raise StudyError(
+            f"{path} is the result of another configuration or study version than {STUDY_VERSION}: "
+            "use another --results folder, or move it away; one study never mixes two"
+        )
+    return state == "finished"
+
+
+class Progress:
+    """What a cell has done and what it cost: goes into checkpoints beside the trainer's state."""
+
+    def __init__(self) -> None:
+        self.measurements: list[dict[str, Any]] = []
+        self.sessions: list[dict[str, Any]] = []
+        self.first_rewards: NDArray[Any] = np.zeros((0, 0))
+        self.seconds = {"training": 0.0, "evaluation": 0.0, "final evaluation": 0.0, "total": 0.0}
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return it, packed."""
+        return {**vars(self), "measurements": store.pack(self.measurements)}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `state_dict` returned."""
+        vars(self).update({**state, "measurements": store.unpack(state["measurements"])})
+
+
+class MeasuredTrainer:
+    """A run that measures itself every tenth epoch.
+
+    Args:
+        cell: whose configuration to run.
+
+    Example:
+        >>> small = (("horizon", 64), ("minibatch_size", 32), ("num_epochs", 1))
+        >>> cell = Cell("test", "ppo", "beta", "Swimmer", seeds=(0, 1), epochs=10, overrides=small)
+        >>> run = MeasuredTrainer(cell)
+        >>> for _ in range(10):
+        ...     run.epoch()
+        >>> run.progress.measurements[0]["epoch"], run.progress.measurements[0]["alpha_q50"].shape
+        (9, (2,))
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self.config = cell.config
+        self.progress = Progress()
+        self.trainer = Trainer(self.config)
+        self.evaluation = GreedyEvaluation(self.trainer)
+        self._collect = self.trainer.collector.collect
+        self._rollout: Rollout | None = None
+        self.trainer.collector.collect = self._watch  # type: ignore[method-assign]  # an epoch keeps no rollout
+
+    @property
+    def done(self) -> int:
+        """Epochs done."""
+        return len(self.trainer.records)
+
+    def epoch(self) -> None:
+        """Do one epoch, and measure after every tenth."""
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", DivergedSeedWarning
+            )  # it is in the rows, and what to do is in the protocol
+            record = self.trainer.epoch()
+        self.progress.seconds["training"] += record["seconds"]
+        rollout, self._rollout = self._rollout, None
+        assert rollout is not None
+        if self.done == 1:
+            self.progress.first_rewards = rollout.reward[:, :FIRST_STEPS].double().numpy().copy()
+        if self.done % MEASURE_EVERY == 0:
+            self._measure(record, rollout)
+
+    def table(self) -> pa.Table:
+        """Return the rows so far."""
+        return store.table_of(self.config, self.trainer.records, self.progress.measurements)
+
+    def _watch(self, horizon: int) -> Rollout:
+        self._rollout = self._collect(horizon)
+        return self._rollout
+
+    def _measure(self, record: Mapping[str, Any], rollout: Rollout) -> None:
+        start = time.perf_counter()
+        greedy_return = self.evaluation(record["epoch"])
+        seconds = time.perf_counter() - start
+        self.progress.seconds["evaluation"] += seconds
+        measured = {"epoch": record["epoch"], "greedy_return": greedy_return, "evaluation_seconds": seconds}
+        measured |= {name: value for name, value in record.items() if name in store.MEASURED}
+        limits = self.config.policy.limits
+        first, second = (p.numpy() for p in rollout.parameters)  # [S, T, A]
+        measured |= describe_parameters(self.config.policy.family, first, second, limits)
+        self.progress.measurements.append(measured)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that the future, and the results, depend on."""
+        state = self.trainer.state_dict()
+        return state | {"records": store.pack(self.trainer.records), "study": self.progress.state_dict()}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go back to a state from `state_dict` of a run with the same configuration."""
+        self.trainer.load_state_dict({**state, "records": store.unpack(state["records"])})
+        self.progress.load_state_dict(state["study"])
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.evaluation.close()
+        self.trainer.envs.close()
+
+
+def describe_parameters(
+    family: str, first: NDArray[Any], second: NDArray[Any], limits: Limits
+) -> dict[str, NDArray[Any]]:
+    """Return quantiles of a law's parameters, and how many are at their clamps.
+
+    Args:
+        family: name of the policy family.
+        first: `[S, T, A]` μ, or α for `beta`.
+        second: `[S, T, A]` log σ, or β.
+        limits: the clamps.
+
+    Returns:
+        `[S]` by the names of `inbounds.study.store.MEASURED`.
+
+    Example:
+        >>> found = describe_parameters("gaussian", np.full((1, 4, 2), -3.0), np.ones((1, 4, 2)), Limits())
+        >>> [found[name].round(2).tolist() for name in ("abs_loc_q50", "scale_q99", "at_log_std_max")]
+        [[3.0], [2.72], [1.0]]
+    """
+    if family == "beta":
+        cap = limits.concentration_max
+        return {
+            **_quantiles("alpha", first, (1, 50, 99)),
+            **_quantiles("beta", second, (1, 50, 99)),
+            "at_alpha_max": (first >= cap).mean((1, 2)),
+            "at_beta_max": (second >= cap).mean((1, 2)),
+        }
+    return {
+        **_quantiles("abs_loc", np.abs(first), (50, 90, 99)),
+        **_quantiles("scale", np.exp(second), (1, 50, 99)),
+        "at_log_std_min": (second <= limits.log_std_min).mean((1, 2)),
+        "at_log_std_max": (second >= limits.log_std_max).mean((1, 2)),
+    }
+
+
+def _quantiles(name: str, values: NDArray[Any], percents: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+    found = np.quantile(values, np.array(percents) / 100, axis=(1, 2))  # [Q, S]
+    return {f"{name}_q{percent:02}": found[i] for i, percent in enumerate(percents)}
+
+
+class _CellRun:
+    """A claimed cell."""
+
+    def __init__(self, cell: Cell, folder: StudyFolder, claim: Claim) -> None:
+        self.cell, self.folder, self.claim = cell, folder, claim
+        self.work = folder.work_of(cell)
+        self.run_ = MeasuredTrainer(cell)
+        self._restore()
+        self.kept = self.run_.done
+        self.run_.progress.sessions.append(provenance() | {"from_epoch": self.kept})
+        self._clock = time.perf_counter()
+
+    def run(self, stop: Callable[[], bool], deadline: float) -> Outcome:
+        """Go on until the end, or a wish to stop."""
+        run, epochs = self.run_, self.cell.epochs
+        self.claim.renew(epoch=run.done, epochs=epochs)
+        try:
+            while run.done < epochs:
+                start = time.time()
+                run.epoch()
+                self.claim.renew(epoch=run.done, epochs=epochs)
+                if run.done % run.config.checkpoint_every == 0 or run.done == epochs:
+                    self._save()
+                late = time.time() + (time.time() - start) > deadline
+                if run.done < epochs and (late or stop()):
+                    self._save()
+                    return "stopped"
+            self._finish()
+            return "finished"
+        finally:
+            run.close()
+
+    def _save(self) -> None:
+        """Write a checkpoint, keeping the one before in case this one comes to harm later."""
+        if self.kept == self.run_.done:
+            return
+        self._tick()
+        path = self.work / checkpoint.FILE_NAME
+        (self.work / PREVIOUS).mkdir(exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            os.replace(path, self.work / PREVIOUS / checkpoint.FILE_NAME)
+        try:
+            checkpoint.save(path, self.run_.state_dict())
+        except BaseException:
+            path.with_suffix(".partial").unlink(missing_ok=True)  # on a full disk every byte counts
+            raise
+        self.kept = self.run_.done
+
+    def _restore(self) -> None:
+        """Go back to the last checkpoint that is whole; start anew where there never was one."""
+        complaints = []
+        for folder in (self.work, self.work / PREVIOUS):
+            try:
+                state = load_checkpoint(folder)
+            except FileNotFoundError:
+                continue
+            except DamagedFileError as error:
+                complaints.append(str(error).partition(": ")[0])
+                continue
+            try:
+                self.run_.load_state_dict(state)
+            except (ValueError, KeyError) as error:
+                raise StudyError(
+                    f"{folder} is not this cell's, or another version's ({error}): move {self.work} away to start anew"
+                ) from error
+            if complaints:
+                warnings.warn(
+                    f"{complaints[0]}; going on from the one before, epoch {self.run_.done}", stacklevel=2
+                )
+            return
+        if complaints:
+            raise StudyError(
+                f"{' and '.join(complaints)}: put a copy in its place, or delete {self.work} to start the cell anew"
+            )
+
+    def _tick(self) -> None:
+        now = time.perf_counter()
+        self.run_.progress.seconds["total"] += now - self._clock
+        self._clock = now
+
+    def _finish(self) -> None:
+        """Publish rows and policies, then drop what they were made from."""
+        run, cell, folder = self.run_, self.cell, self.folder
+        contents: dict[Path, Any] = {}
+        policies, returns = folder.policy_files(cell)
+        temporary = self.work / policies.name
+        save_policies(temporary, run.trainer)
+        if cell.keeps_policies:
+            start = time.perf_counter()
+            rows = evaluate_finally(run.trainer)
+            run.progress.seconds["final evaluation"] = time.perf_counter() - start
+            contents[policies] = temporary.read_bytes()
+            contents[returns] = store.parquet_bytes(
+                pa.Table.from_pylist(rows, _RETURNS), store.cell_metadata(cell, run.config)
+            )
+        self._tick()
+        progress = run.progress
+        metadata = store.cell_metadata(
+            cell,
+            run.config,
+            greedy=run.evaluation.greedy,
+            sessions=progress.sessions,
+            seconds=progress.seconds,
+            first_rewards=progress.first_rewards.tolist(),
+        )
+        contents[folder.cell_file(cell)] = store.parquet_bytes(run.table(), metadata)
+        self.claim.check()
+        folder.publish(contents)
+        for path in (self.work / checkpoint.FILE_NAME, self.work / PREVIOUS / checkpoint.FILE_NAME):
+            path.unlink(missing_ok=True)
+        if cell.keeps_policies:
+            temporary.unlink()
+
+
+_RETURNS = pa.schema(
+    [
+        pa.field("seed", pa.int32(), nullable=False),
+        pa.field("greedy", pa.string(), nullable=False),
+        pa.field("episode", pa.int32(), nullable=False),
+        pa.field("return", pa.float64(), nullable=False),
+        pa.field("length", pa.int32(), nullable=False),
+    ]
+)
+
+
+def is_disk_full(error: BaseException | None) -> bool:
+    """Tell whether an error, or what led to it, is a disk (or a quota) without room."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -1,0 +1,166 @@
+"""`inbounds study run | resume | status | verify`: what the words of the command line do."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, Union
+
+import tyro
+from rich.console import Console
+from tyro.conf import Positional, arg, subcommand
+
+from inbounds.study.cell_run import StudyError
+from inbounds.study.grid import Cell, select
+from inbounds.study.progress import StudyProgress, cell_status, status_table
+from inbounds.study.run import Settings, run_study
+from inbounds.study.store import StudyFolder
+from inbounds.study.verify import Finding, verify
+
+Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...]")]
+
+
+@dataclass(frozen=True)
+class _Where:
+    cells: Cells = ()
+    """Which: arms (standard, printed, beyond, mechanisms), ids, or patterns like '*-hopper-ppo-*'; by default all."""
+    results: Path = StudyFolder.results
+    """Folder of the results."""
+    work: Path = StudyFolder.work
+    """Folder of claims and checkpoints."""
+
+    def folder(self) -> StudyFolder:
+        """Return the two folders."""
+        return StudyFolder(self.results, self.work)
+
+    def chosen(self) -> tuple[Cell, ...]:
+        """Return the cells.
+
+        Raises:
+            ValueError: a pattern matches nothing.
+        """
+        return select(self.cells)
+
+
+@dataclass(frozen=True)
+class Run(_Where):
+    """Run cells, in the study's order; finished ones stay, begun ones go on. Several of it may share a folder."""
+
+    settings: Annotated[Settings, arg(name="")] = field(default_factory=Settings)
+
+
+@dataclass(frozen=True)
+class Resume(Run):
+    """The same as run: every run goes on where the last one stopped."""
+
+
+@dataclass(frozen=True)
+class Status(_Where):
+    """Show how far the study is."""
+
+    each: bool = False
+    """A line for each cell."""
+
+
+@dataclass(frozen=True)
+class Verify(_Where):
+    """Check the sums of all results, and run the first epochs of some cells again."""
+
+    epochs: int = 2
+    """To run again."""
+    rerun: tuple[str, ...] = ()
+    """Which cells; by default one per algorithm and family."""
+    random: int = 0
+    """Choose so many finished cells at random instead."""
+    random_seed: int = 0
+    """Of that choice."""
+
+
+StudyCommand: TypeAlias = Run | Resume | Status | Verify
+COMMANDS: dict[str, type[StudyCommand]] = {"run": Run, "resume": Resume, "status": Status, "verify": Verify}
+
+
+def study(args: Sequence[str]) -> int:
+    """Do what a command line after `inbounds study` says.
+
+    Args:
+        args: its words.
+
+    Returns:
+        The exit code: 0; 1 where something failed; 2 where the command line is wrong; 128 + a signal that ended it.
+
+    Raises:
+        SystemExit: help was asked for, or the command line is wrong; either has been written.
+
+    Example:
+        >>> study(["status", "standard-swimmer-*", "--results", "no/results", "--work", "no/work", "--each"])
+        standard-swimmer-ppo-gaussian: missing
+        standard-swimmer-ppo-beta: missing
+        standard-swimmer-ppo-logit-normal: missing
+        standard-swimmer-trpo-gaussian: missing
+        standard-swimmer-trpo-logit-normal: missing
+        0
+    """
+    read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
+    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
+    description = "The study of the book: all algorithms, families and robots, ten seeds each."
+    command: StudyCommand = read(
+        Union[kinds],  # noqa: UP007
+        args=list(args) or ["--help"],
+        prog="inbounds study",
+        description=description,
+    )
+    console = Console(highlight=False, force_jupyter=False)
+    try:
+        cells = command.chosen()
+        if isinstance(command, Run):
+            return _run(command, cells, console)
+        if isinstance(command, Status):
+            return _status(command, cells, console)
+        return _verify(command, cells, console)
+    except ValueError as error:
+        return _complain(str(error), 2)
+    except StudyError as error:
+        return _complain(str(error), 1)
+
+
+def _run(command: Run, cells: Sequence[Cell], console: Console) -> int:
+    folder = command.folder()
+    summary = run_study(cells, folder, command.settings, StudyProgress(cells, folder, console))
+    finished = sum("finished" in report.outcome for report in summary.reports.values())
+    console.print(f"{finished} of {len(cells)} cells are finished", markup=False)
+    if finished < len(cells):
+        console.print("the same command goes on with the others", markup=False)
+    if summary.signal:
+        return 128 + summary.signal
+    return 1 if summary.failed else 0
+
+
+def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
+    if command.each:
+        for cell in cells:
+            console.print(f"{cell.id}: {cell_status(cell, command.folder())}", markup=False, soft_wrap=True)
+    else:
+        console.print(status_table(cells, command.folder()))
+    return 0
+
+
+def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
+    def show(finding: Finding) -> None:
+        mark = "ok" if finding.ok else "WRONG"
+        console.print(f"{mark:5} {finding.subject}: {finding.message}", markup=False, soft_wrap=True)
+
+    rerun = select(command.rerun, cells) if command.rerun else None
+    if command.random:
+        finished = [cell for cell in cells if command.folder().state(cell) == "finished"]
+        chooser = random.Random(command.random_seed)
+        rerun = tuple(chooser.sample(finished, min(command.random, len(finished))))
+    findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
+    return 0 if all(finding.ok for finding in findings) else 1
+
+
+def _complain(message: str, code: int) -> int:
+    Console(stderr=True, highlight=False).print(f"inbounds study: {message}", markup=False, soft_wrap=True)
+    return code

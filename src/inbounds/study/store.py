@@ -1,0 +1,278 @@
+"""What the study leaves: a Parquet file per cell, policies, checksums.
+
+    results/cells/ID.parquet          one row per epoch and seed; `COLUMNS` is the schema
+    results/policies/ID.safetensors   the final policies of all seeds (`inbounds.learning.run_store.load_policies`)
+    results/policies/ID.parquet       their returns: one row per seed, way to act and episode
+    results/checksums.txt             SHA-256 of each file, as `sha256sum --check` reads it
+
+A cell is finished when its Parquet file is there; that is written last, whole, and after its checksum.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from inbounds.learning import TrainConfig
+from inbounds.learning.run_files import METADATA_KEY, DamagedFileError, metadata_of, write_whole
+from inbounds.study.claim import file_lock
+from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
+
+CHECKSUMS_FILE = "checksums.txt"
+State = Literal["missing", "finished", "damaged", "another configuration"]
+
+EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
+    "epoch": (pa.int32(), "0, 1, …: rollouts, each followed by one update"),
+    "seed": (pa.int32(), "the seed"),
+    "env_steps": (pa.int64(), "steps of this seed's environment up to the end of the epoch"),
+    "seconds": (pa.float64(), "wall time of the epoch, all seeds together, without evaluation [s]"),
+    "episodes": (pa.int32(), "episodes that ended within the epoch"),
+    "return_mean": (pa.float64(), "mean undiscounted return of those episodes; NaN where none ended"),
+    "diverged": (pa.bool_(), "the seed's weights are not finite"),
+}
+_NOISE = "of the policy that drew the epoch's rollout, over its states and the action's dimensions"
+MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
+    "greedy_return": (
+        pa.float64(),
+        "return of one episode without noise: the median action, for beta the mean",
+    ),
+    "evaluation_seconds": (pa.float64(), "wall time of that evaluation, all seeds together [s]"),
+    "entropy": (pa.float32(), "mean entropy after the update, the one of the family's bonus [nats]"),
+    "kl": (pa.float32(), "mean exact KL(old‖new) of the update [nats]"),
+    "approx_kl": (pa.float32(), "its estimate from the drawn latents [nats]"),
+    "clip_fraction": (pa.float32(), "PPO: fraction of steps whose ratio ended beyond 1 ± ε"),
+    "accepted": (pa.float32(), "TRPO: 1 where the line search accepted a step, else 0"),
+    "step_fraction": (pa.float32(), "TRPO: accepted length, as a fraction of the full step"),
+    "explained_variance": (pa.float32(), "of the returns by the values before the update"),
+    "action_std": (pa.float32(), "standard deviation of the executed actions, in units of half the range"),
+    "saturation": (pa.float32(), "fraction of executed action components within 0.1 % of a bound"),
+    **{f"abs_loc_q{q:02}": (pa.float32(), f"{q} % quantile of |μ|, {_NOISE}") for q in (50, 90, 99)},
+    **{f"scale_q{q:02}": (pa.float32(), f"{q} % quantile of σ, {_NOISE}") for q in (1, 50, 99)},
+    "at_log_std_min": (pa.float32(), f"fraction of log σ at the lower clip, {_NOISE}"),
+    "at_log_std_max": (pa.float32(), f"fraction of log σ at the upper clip, {_NOISE}"),
+    **{f"alpha_q{q:02}": (pa.float32(), f"{q} % quantile of α, {_NOISE}") for q in (1, 50, 99)},
+    **{f"beta_q{q:02}": (pa.float32(), f"{q} % quantile of β, {_NOISE}") for q in (1, 50, 99)},
+    "at_alpha_max": (pa.float32(), f"fraction of α at the cap, {_NOISE}"),
+    "at_beta_max": (pa.float32(), f"fraction of β at the cap, {_NOISE}"),
+}
+COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {**EVERY_EPOCH, **MEASURED}
+"""Column → type and meaning. Those of `MEASURED` are null but for every tenth epoch; a file has those of its
+algorithm and family."""
+
+TIMINGS = ("seconds", "evaluation_seconds")
+"""The columns that no run repeats."""
+
+
+@dataclass(frozen=True)
+class StudyFolder:
+    """Where results go, and where unfinished work is kept.
+
+    Args:
+        results: what is shared and published.
+        work: claims and checkpoints; several machines that work together must share it too.
+    """
+
+    results: Path = Path("results")
+    work: Path = Path("runs/study")
+
+    def cell_file(self, cell: Cell) -> Path:
+        """Return the path of a cell's rows."""
+        return self.results / "cells" / f"{cell.id}.parquet"
+
+    def policy_files(self, cell: Cell) -> tuple[Path, Path]:
+        """Return the paths of a cell's policies and of their returns."""
+        folder = self.results / "policies" if cell.keeps_policies else self.work_of(cell)
+        return folder / f"{cell.id}.safetensors", folder / f"{cell.id}.parquet"
+
+    def files(self, cell: Cell) -> list[Path]:
+        """Return the paths of all that a cell contributes to the results."""
+        return [self.cell_file(cell), *(self.policy_files(cell) if cell.keeps_policies else ())]
+
+    def work_of(self, cell: Cell) -> Path:
+        """Return the folder of a cell's claim and checkpoints."""
+        return self.work / cell.id
+
+    def state(self, cell: Cell) -> State:
+        """Return what there is of a cell: its rows are compared with their checksum and the cell's configuration."""
+        path = self.cell_file(cell)
+        if not path.is_file():
+            return "missing"
+        sums = self.checksums()
+        try:
+            metadata = read_metadata(path)
+        except DamagedFileError:
+            return "damaged"
+        if any(not file.is_file() or sums.get(self._name(file)) != sha256(file) for file in self.files(cell)):
+            return "damaged"
+        return "finished" if metadata["digest"] == cell.digest else "another configuration"
+
+    def checksums(self) -> dict[str, str]:
+        """Return SHA-256 by file name, relative to the results; empty if there is no list."""
+        try:
+            lines = (self.results / CHECKSUMS_FILE).read_text().splitlines()
+        except FileNotFoundError:
+            return {}
+        return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}
+
+    def publish(self, contents: Mapping[Path, Any]) -> None:
+        """Write files of the results, each whole, the last one last, and their checksums before them.
+
+        Args:
+            contents: bytes or buffers by path.
+        """
+        self.results.mkdir(parents=True, exist_ok=True)
+        new = {self._name(path): hashlib.sha256(data).hexdigest() for path, data in contents.items()}
+        with file_lock(self.results / ".lock"):
+            sums = self.checksums() | new
+            lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
+            write_whole(self.results / CHECKSUMS_FILE, lines.encode())
+        for path, data in contents.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, data)
+
+    def _name(self, path: Path) -> str:
+        return path.relative_to(self.results).as_posix()
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+# ---- tables
+
+
+def table_of(
+    config: TrainConfig, records: Sequence[Mapping[str, Any]], measurements: Sequence[Mapping[str, Any]]
+) -> pa.Table:
+    """Return the rows of a run, epoch by epoch and seed by seed.
+
+    Args:
+        config: of the run.
+        records: of every epoch, as a `Trainer` keeps them.
+        measurements: of every tenth epoch: `epoch`, and `[S]` by the names of `MEASURED`.
+    """
+    num_seeds, rows = len(config.seeds), len(records) * len(config.seeds)
+    fields, arrays = [], []
+    for name, (kind, meaning) in EVERY_EPOCH.items():
+        values = [config.seeds if name == "seed" else record[name] for record in records]
+        column = np.concatenate([np.broadcast_to(value, num_seeds) for value in values])
+        arrays.append(pa.array(column, kind, from_pandas=False))
+        fields.append(pa.field(name, kind, nullable=False, metadata={"meaning": meaning}))
+    at = np.array([m["epoch"] * num_seeds + s for m in measurements for s in range(num_seeds)], np.int64)
+    for name in [name for name in MEASURED if measurements and name in measurements[0]]:
+        kind, meaning = MEASURED[name]
+        column, absent = np.full(rows, np.nan), np.ones(rows, np.bool_)
+        column[at] = np.concatenate([np.broadcast_to(m[name], num_seeds) for m in measurements])
+        absent[at] = False
+        arrays.append(pa.array(column.astype(kind.to_pandas_dtype()), kind, mask=absent, from_pandas=False))
+        fields.append(pa.field(name, kind, metadata={"meaning": meaning}))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+def parquet_bytes(table: pa.Table, metadata: str) -> Any:
+    """Return a table as a Parquet file: floats without loss, their bytes split into streams, compressed by zstd."""
+    encodings = {
+        field.name: "BYTE_STREAM_SPLIT" if pa.types.is_floating(field.type) else "DELTA_BINARY_PACKED"
+        for field in table.schema
+        if pa.types.is_floating(field.type) or pa.types.is_integer(field.type)
+    }
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table.replace_schema_metadata({METADATA_KEY: metadata}),
+        sink,
+        compression="zstd",
+        compression_level=9,
+        use_dictionary=False,
+        column_encoding=encodings,
+        write_page_checksum=True,
+    )
+    return sink.getvalue()
+
+
+def cell_metadata(cell: Cell, config: TrainConfig, **more: Any) -> str:
+    """Return what a cell's file says of itself, as JSON: its configuration, its name, versions, and more."""
+    cell_fields = ("arm", "algorithm", "family", "robot", "variant", "preset")
+    about = {"study_version": STUDY_VERSION, "id": cell.id, "digest": digest_of(config)}
+    about |= {name: getattr(cell, name) for name in cell_fields}
+    return json.dumps(json.loads(metadata_of(config)) | about | more)
+
+
+def read_cell(path: str | Path) -> pa.Table:
+    """Read the rows of a cell; `read_metadata` gives what belongs to them.
+
+    Args:
+        path: of results/cells/ID.parquet.
+
+    Returns:
+        The table, with the columns of `COLUMNS` of its algorithm and family.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        DamagedFileError: it is damaged.
+    """
+    try:
+        return pq.read_table(path, page_checksum_verification=True)
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError) as error:
+        raise _damaged(Path(path), error) from error
+
+
+def read_metadata(path: str | Path) -> dict[str, Any]:
+    """Return what a cell's file says of itself.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        DamagedFileError: it is damaged.
+    """
+    try:
+        found = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+        raise _damaged(Path(path), error) from error
+    if not {"digest", "study_version", "id"} <= found.keys():
+        raise _damaged(Path(path), "it is no cell of a study")
+    return found
+
+
+def _damaged(path: Path, reason: object) -> DamagedFileError:
+    said = (str(reason) or type(reason).__name__).splitlines()[0]
+    return DamagedFileError(f"{path} is damaged ({said[:120]}): {restore(path)}")
+
+
+def restore(path: Path) -> str:
+    """Return what to do about a damaged result."""
+    return f"restore it (git checkout -- {path}), or delete it and run the cell again"
+
+
+# ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch
+
+
+def pack(records: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Return records with the same names as one array `[E, ...]` per name.
+
+    Example:
+        >>> pack([{"epoch": 0, "kl": np.zeros(2)}, {"epoch": 1, "kl": np.ones(2)}])["kl"].shape
+        (2, 2)
+    """
+    return {name: np.stack([record[name] for record in records]) for name in (records[0] if records else ())}
+
+
+def unpack(packed: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    """Return the records that `pack` was given; numbers as Python numbers."""
+    number = len(next(iter(packed.values()))) if packed else 0
+    return [
+        {name: array[i].item() if array.ndim == 1 else array[i].copy() for name, array in packed.items()}
+        for i in range(number)
+    ]

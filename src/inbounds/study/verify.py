@@ -1,0 +1,206 @@
+"""Whether the results are what they say: checksums, and the first epochs of chosen cells run again.
+
+On the processor and with the wheels that a cell began on, its rows must be repeated exactly. Elsewhere rounding
+differs, and chaotic physics amplifies the difference: there the rewards of the first env steps of each seed are
+compared, to `TOLERANCE`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from inbounds.learning import TrainConfig
+from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.training import describe
+from inbounds.study import store
+from inbounds.study.cell_run import MeasuredTrainer
+from inbounds.study.grid import STUDY_VERSION, Cell
+from inbounds.study.provenance import provenance
+from inbounds.study.store import CHECKSUMS_FILE, StudyFolder
+
+TOLERANCE = 1e-3
+"""Of rewards, absolute and relative, in the first steps on another machine."""
+
+
+class Finding(NamedTuple):
+    """What a check found."""
+
+    subject: str
+    """A file or a cell."""
+    ok: bool
+    """Whether it is as it should be."""
+    message: str
+    """What was compared, or what is wrong and what to do."""
+
+
+def verify(
+    cells: Sequence[Cell],
+    folder: StudyFolder,
+    *,
+    epochs: int = 2,
+    rerun: Sequence[Cell] | None = None,
+    on_finding: Callable[[Finding], None] = lambda finding: None,
+) -> list[Finding]:
+    """Check the sums of all results, and run the first epochs of some cells again.
+
+    Args:
+        cells: of the study; those without results are passed over.
+        folder: where the results are.
+        epochs: to run again, of each chosen cell.
+        rerun: which cells; None is the first finished one of each algorithm × family.
+        on_finding: called with each finding as it is made.
+
+    Returns:
+        The findings, bad ones included.
+    """
+    findings: list[Finding] = []
+
+    def say(finding: Finding) -> None:
+        findings.append(finding)
+        on_finding(finding)
+
+    for finding in [*check_sums(folder), *check_cells(cells, folder)]:
+        say(finding)
+    finished = [cell for cell in cells if folder.state(cell) == "finished"]
+    for cell in representatives(finished) if rerun is None else rerun:
+        say(check_rerun(cell, folder, epochs))
+    return findings
+
+
+def representatives(cells: Sequence[Cell]) -> list[Cell]:
+    """Return the first cell of each algorithm × family.
+
+    Example:
+        >>> from inbounds.study.grid import study_cells
+        >>> len(representatives(study_cells()))
+        8
+    """
+    return list({(cell.algorithm, cell.family): cell for cell in reversed(cells)}.values())[::-1]
+
+
+def check_sums(folder: StudyFolder) -> list[Finding]:
+    """Compare every listed file with its sum, and list the files that nobody lists."""
+    sums = folder.checksums()
+    findings = []
+    for name, expected in sums.items():
+        path = folder.results / name
+        if not path.is_file():
+            findings.append(Finding(name, False, f"missing: {store.restore(path)}"))
+        elif store.sha256(path) != expected:
+            findings.append(Finding(name, False, f"its checksum is wrong: {store.restore(path)}"))
+    found = {path.relative_to(folder.results).as_posix() for path in _data_files(folder.results)}
+    findings += [
+        Finding(name, False, f"not in {CHECKSUMS_FILE}: delete it, or restore the list")
+        for name in sorted(found - sums.keys())
+    ]
+    good = len(sums) - sum(not finding.ok and finding.subject in sums for finding in findings)
+    return [*findings, Finding(CHECKSUMS_FILE, good > 0, f"{good} of {len(sums)} files have their checksums")]
+
+
+def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Finding]:
+    """Compare what each cell's file says of itself with the study, and count its rows."""
+    findings = []
+    for cell in cells:
+        path = folder.cell_file(cell)
+        if not path.is_file():
+            continue
+        try:
+            metadata, rows = store.read_metadata(path), store.read_cell(path).num_rows
+        except DamagedFileError as error:
+            findings.append(Finding(cell.id, False, str(error)))
+            continue
+        if metadata["study_version"] != STUDY_VERSION or metadata["digest"] != cell.digest:
+            said = f"of study version {metadata['study_version']} or another configuration: move it away"
+            findings.append(Finding(cell.id, False, said))
+        elif rows != cell.epochs * len(cell.seeds):
+            said = f"{rows} rows instead of {cell.epochs * len(cell.seeds)}: {store.restore(path)}"
+            findings.append(Finding(cell.id, False, said))
+    return findings
+
+
+def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
+    """Run the first epochs of a cell again and compare them with its rows."""
+    path = folder.cell_file(cell)
+    try:
+        rows, metadata = store.read_cell(path), store.read_metadata(path)
+    except (FileNotFoundError, DamagedFileError) as error:
+        return Finding(cell.id, False, str(error))
+    epochs = min(epochs, cell.epochs)
+    run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
+    if different := _differences(run.config, metadata["config"]):
+        return Finding(cell.id, False, f"its file was made with another configuration ({different})")
+    for _ in range(epochs):
+        run.epoch()
+    run.close()
+    here, there = provenance(), metadata["sessions"][0]
+    same = all(here[key] == there[key] for key in ("processor", "versions"))
+    if not same:
+        return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)
+    mismatch = first_mismatch(rows.filter(pc.less(rows["epoch"], epochs)), run.table())
+    if mismatch:
+        return Finding(
+            cell.id,
+            False,
+            f"{mismatch}: the engine now gives other results; a new study version is due, or the change undone",
+        )
+    return Finding(cell.id, True, f"{epochs} epochs repeated exactly")
+
+
+def first_mismatch(expected: pa.Table, found: pa.Table) -> str:
+    """Return where two tables of the same cell first differ, wall times aside; empty where nowhere.
+
+    NaN equals NaN, null equals null, and everything else only itself.
+    """
+    for name in expected.column_names:
+        if name in store.TIMINGS:
+            continue
+        if name not in found.column_names:
+            if expected[name].null_count == len(expected):  # not measured in so few epochs
+                continue
+            return f"column {name} is missing"
+        ours, theirs = found[name].combine_chunks(), expected[name].combine_chunks()
+        if len(ours) != len(theirs):
+            return f"{len(ours)} rows instead of {len(theirs)}"
+        if not ours.equals(theirs):  # bitwise but for NaN and zeros
+            for i, (a, b) in enumerate(zip(ours.to_pylist(), theirs.to_pylist(), strict=True)):
+                if a != b and not (a != a and b != b):
+                    row = expected.slice(i, 1).select(["epoch", "seed"]).to_pylist()[0]
+                    return f"{name} is {a!r} instead of {b!r} in epoch {row['epoch']}, seed {row['seed']}"
+    return ""
+
+
+def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, Any]) -> Finding:
+    expected = np.array(metadata["first_rewards"])
+    if found.shape != expected.shape:
+        return Finding(name, False, f"rewards of shape {found.shape} instead of {expected.shape}")
+    error = float(np.max(np.abs(found - expected) / (1 + np.abs(expected)), initial=0.0))
+    said = f"rewards of the first {expected.shape[1]} steps differ by at most {error:.1e} (tolerance {TOLERANCE:g})"
+    ran = f"; another processor or other wheels than {metadata['sessions'][0]['processor']}: no exact comparison"
+    return Finding(name, bool(error <= TOLERANCE), said + ran)
+
+
+def _differences(config: TrainConfig, stored: dict[str, Any]) -> str:
+    free = ("epochs", "checkpoint_every", "seeds")
+    ours = describe(config)
+    return ", ".join(key for key in ours if key not in free and _plain(ours[key]) != _plain(stored.get(key)))
+
+
+def _plain(value: Any) -> Any:
+    """As JSON gives it back: tuples are lists there."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _data_files(results: Path) -> list[Path]:
+    return [
+        path for part in ("cells", "policies") for path in (results / part).glob("[!.]*") if path.is_file()
+    ]
