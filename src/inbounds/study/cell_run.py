@@ -202,7 +202,7 @@ class MeasuredTrainer:
 
     def close(self) -> None:
         """Close the environments."""
-        self.evaluation.close()
+        self.evaluation.players.close()
         self.trainer.envs.close()
 
 

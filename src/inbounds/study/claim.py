@@ -1,9 +1,9 @@
 """One process per cell: a claim is a file that says who runs it, and how far it is.
 
 Several `inbounds study run` on one folder, on one machine or on many that share it, divide the cells among
-themselves by claims alone. A claim whose process is dead (on the same host: no such process, or another one of that number) or which
-has not been renewed for `SILENCE` seconds (on another host) is taken over. Every look followed by a write happens
-under a file lock, so that two cannot take over the same claim.
+themselves by claims alone. A claim whose process is dead (on the same host: no such process, or another one of that
+number) or which has not been renewed for `SILENCE` seconds (on another host) is taken over. Every look followed by a
+write happens under a file lock, so that two cannot take over the same claim.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ import torch
 from numpy.typing import NDArray
 
 from inbounds.learning import Trainer
-from inbounds.learning.run_store import policies_of
 from inbounds.learning.training import Environments, make_environments, one_thread
 
 _STREAM = 4  # spawn keys below it are training's
@@ -54,6 +53,61 @@ def play(envs: Environments, act: Act, starts: Sequence[int]) -> tuple[NDArray[A
     return returns, lengths
 
 
+class Players:
+    """The policies of a run, as they stand, in environments of their own: S seeds × E episodes side by side.
+
+    Args:
+        trainer: the run.
+        episodes: E, of each seed.
+    """
+
+    def __init__(self, trainer: Trainer, episodes: int = 1) -> None:
+        self.trainer, self.episodes = trainer, episodes
+        self.envs = make_environments(trainer.config, len(trainer.config.seeds) * episodes)
+
+    def play(
+        self, way: str, starts: Sequence[int], generators: Sequence[np.random.Generator] = ()
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Play E episodes of each seed.
+
+        Args:
+            way: to act: "mean", "median", "mode" or "sample".
+            starts: S·E seeds of the episodes' starts, those of a policy in a row.
+            generators: one per policy, for "sample".
+
+        Returns:
+            Returns and lengths, `[S, E]` each; NaN returns for a diverged seed.
+        """
+        draws = [generator for generator in generators for _ in range(self.episodes)]
+        with one_thread(), torch.no_grad(), np.errstate(invalid="ignore"):
+            returns, lengths = play(self.envs, lambda obs: self._act(obs, way, draws), starts)
+        shape = (len(self.trainer.config.seeds), self.episodes)
+        returns = np.where(self.trainer.diverged[:, None], np.nan, returns.reshape(shape))
+        return returns, lengths.reshape(shape)
+
+    def _act(self, obs: NDArray[Any], way: str, generators: Sequence[np.random.Generator]) -> NDArray[Any]:
+        collector, networks = self.trainer.collector, self.trainer.networks
+        policy, normalizer = networks.policy, collector.normalizer
+        by_seed = obs.reshape(-1, self.episodes, obs.shape[1]).swapaxes(
+            0, 1
+        )  # [E, S, O], as statistics broadcast
+        seen = by_seed.astype(collector.dtype) if normalizer is None else normalizer(by_seed)
+        outputs = networks.outputs(torch.from_numpy(seen.swapaxes(0, 1))).flatten(0, 1)  # [S·E, 2A]
+        if way == "sample":
+            draw = policy.law.sampler(generators, 1, policy.act_dim, collector.dtype)
+            action = policy.action(draw(policy.parameters(outputs.numpy(), np), 0))
+            if collector.action_mode == "clip":
+                action = np.clip(action, policy.low, policy.high)
+        else:
+            action = policy.greedy(outputs, way)
+        action = action.astype(collector.action_dtype)
+        return np.where(np.isfinite(action), action, collector.centre)  # a diverged seed holds still
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.envs.close()
+
+
 class GreedyEvaluation:
     """Plays, after an epoch, one greedy episode of every seed of a run.
 
@@ -64,39 +118,20 @@ class GreedyEvaluation:
     """
 
     def __init__(self, trainer: Trainer) -> None:
-        self.trainer = trainer
-        self.greedy = greedy_choice(trainer)
-        self.envs = make_environments(trainer.config, len(trainer.config.seeds))
+        self.seeds = trainer.config.seeds
+        self.greedy = "median" if "median" in trainer.networks.policy.family.greedy else "mean"
+        self.players = Players(trainer)
 
     def __call__(self, epoch: int) -> NDArray[Any]:
         """Return the returns `[S]`; NaN for a diverged seed."""
-        starts = [int(generator_of(seed, epoch).integers(2**31)) for seed in self.trainer.config.seeds]
-        with one_thread(), np.errstate(invalid="ignore"):
-            returns, _ = play(self.envs, self._act, starts)
-        return np.where(self.trainer.diverged, np.nan, returns)
-
-    def _act(self, obs: NDArray[Any]) -> NDArray[Any]:
-        collector, networks = self.trainer.collector, self.trainer.networks
-        normalizer = collector.normalizer
-        seen = obs.astype(collector.dtype) if normalizer is None else normalizer(obs)
-        outputs = torch.from_numpy(networks.actor.act(seen))
-        action = networks.policy.greedy(outputs, self.greedy).astype(collector.action_dtype)
-        return np.where(np.isfinite(action), action, collector.centre)  # a diverged seed holds still
-
-    def close(self) -> None:
-        """Close the environments."""
-        self.envs.close()
-
-
-def greedy_choice(trainer: Trainer) -> str:
-    """Return the greedy action that a run is evaluated by."""
-    return "median" if "median" in trainer.networks.policy.family.greedy else "mean"
+        starts = [int(generator_of(seed, epoch).integers(2**31)) for seed in self.seeds]
+        return self.players.play(self.greedy, starts)[0][:, 0]
 
 
 def evaluate_finally(trainer: Trainer, episodes: int = FINAL_EPISODES) -> list[dict[str, Any]]:
     """Play episodes of every seed's policy under each way to act that its family offers.
 
-    Every way meets the same starts. Diverged seeds are left out.
+    Every way meets the same starts.
 
     Args:
         trainer: the finished run.
@@ -105,20 +140,17 @@ def evaluate_finally(trainer: Trainer, episodes: int = FINAL_EPISODES) -> list[d
     Returns:
         A row per seed, way and episode: `seed`, `greedy`, `episode`, `return`, `length`.
     """
-    envs = make_environments(trainer.config, episodes)
+    seeds, players = trainer.config.seeds, Players(trainer, episodes)
+    starts = [
+        int(start) for seed in seeds for start in generator_of(seed, _FINAL).integers(2**31, size=episodes)
+    ]
     rows = []
-    with one_thread():
-        for policy in policies_of(trainer):
-            if policy.diverged:
-                continue
-            starts = [int(s) for s in generator_of(policy.seed, _FINAL).integers(2**31, size=episodes)]
-            for way in policy.greedy_choices:
-                rng = generator_of(policy.seed, _FINAL + 1)
-                act: Act = lambda obs, policy=policy, way=way, rng=rng: policy.act(obs, way, rng)  # type: ignore[misc]  # noqa: E731
-                returns, lengths = play(envs, act, starts)
-                rows += [
-                    {"seed": policy.seed, "greedy": way, "episode": i, "return": r, "length": n}
-                    for i, (r, n) in enumerate(zip(returns.tolist(), lengths.tolist(), strict=True))
-                ]
-    envs.close()
+    for way in (*trainer.networks.policy.family.greedy, "sample"):
+        returns, lengths = players.play(way, starts, [generator_of(seed, _FINAL + 1) for seed in seeds])
+        rows += [
+            {"seed": seed, "greedy": way, "episode": e, "return": returns[s, e], "length": int(lengths[s, e])}
+            for s, seed in enumerate(seeds)
+            for e in range(episodes)
+        ]
+    players.close()
     return rows

@@ -1,0 +1,109 @@
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from inbounds.learning import preset
+from inbounds.learning.training import describe
+from inbounds.study.grid import ARMS, ROBOTS, VARIANTS, Cell, select, study_cells
+
+PROTOCOL = Path(__file__).parents[2] / "results" / "PROTOCOL.md"
+
+
+def differences(a: Cell, b: Cell) -> set[str]:
+    def flat(values: dict, prefix: str = "") -> dict:
+        found = {}
+        for key, value in values.items():
+            found |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+        return found
+
+    ours, theirs = flat(describe(a.config)), flat(describe(b.config))
+    return {key for key in ours | theirs if ours.get(key) != theirs.get(key)}
+
+
+def test_the_arms_are_those_of_the_protocol() -> None:
+    rows = re.findall(r"^\| \d (\w+) \|.*\| (\d+) \|$", PROTOCOL.read_text(), re.MULTILINE)
+    assert {name: int(count) for name, count in rows} == {arm: len(cells) for arm, cells in ARMS.items()}
+    assert [name for name, _ in rows] == list(ARMS)
+
+
+def test_the_variants_are_those_of_the_protocol() -> None:
+    table = PROTOCOL.read_text().partition("| Variant |")[2].partition("\n\n")[0]
+    named = {}
+    for line in table.splitlines()[2:]:
+        cells = line.split("|")
+        variants = re.findall(r"`([^`]+)`", cells[1])
+        assert sum(cell.variant in variants for cell in ARMS["mechanisms"]) == int(cells[5])
+        named |= dict.fromkeys(variants)
+    assert named.keys() == VARIANTS.keys() - {""}
+
+
+def test_ids_and_digests_are_unique_but_for_nothing() -> None:
+    cells = study_cells()
+    assert max(Counter(cell.id for cell in cells).values()) == 1
+    assert max(Counter(cell.digest for cell in cells).values()) == 1
+    assert all(re.fullmatch(r"[a-z0-9.-]+", cell.id) for cell in cells)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_one_robot_after_another(arm: str) -> None:
+    order = [ROBOTS.index(cell.robot) for cell in ARMS[arm]]
+    assert order == sorted(order)
+
+
+def test_every_cell_has_the_full_length() -> None:
+    for cell in study_cells():
+        assert cell.config.epochs == 500
+        assert cell.config.algorithm.horizon == 2048
+        assert cell.config.seeds == tuple(range(10))
+        assert cell.keeps_policies == (cell.arm == "standard")
+
+
+def test_printed_cells_are_the_preset() -> None:
+    for cell in ARMS["printed"]:
+        assert cell.config == preset("as-printed", cell.config.env, policy=cell.family, algo=cell.algorithm)
+
+
+@pytest.mark.parametrize("variant", VARIANTS.keys() - {""})
+def test_a_variant_changes_one_thing(variant: str) -> None:
+    changed = {
+        "matched-noise": "policy.initial_std",
+        "raw-cost": "action_mode",
+        "gamma-0.9999": "algorithm.gamma",
+        "printed-clip": "algorithm.clip_range",
+        "printed-observations": "normalize_obs",
+        "printed-advantages": "algorithm.normalize_advantage",
+        "printed-gradients": "algorithm.max_grad_norm",
+        "printed-weights": "network.initialization",
+    }.get(variant, "algorithm.entropy_coef")
+    for cell in [cell for cell in ARMS["mechanisms"] if cell.variant == variant]:
+        plain = Cell("standard", cell.algorithm, cell.family, cell.robot)
+        assert differences(cell, plain) == {changed}
+
+
+def test_one_factor_variants_take_the_printed_value() -> None:
+    printed = Cell("printed", "ppo", "gaussian", "Hopper", preset="as-printed")
+    plain = Cell("standard", "ppo", "gaussian", "Hopper")
+    factors = [name for name in VARIANTS if name.startswith("printed-")]
+    told_apart = set()
+    for name in factors:
+        cell = Cell("mechanisms", "ppo", "gaussian", "Hopper", name)
+        (changed,) = differences(cell, plain)
+        assert changed not in differences(cell, printed)
+        told_apart.add(changed)
+    assert differences(plain, printed) - told_apart == {"algorithm.adam_eps"}
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(ValueError, match="no variant 'entropy-1'; choose one of matched-noise"):
+        Cell("test", "ppo", "beta", "Hopper", "entropy-1")
+    with pytest.raises(ValueError, match="no robot 'Hopper-v5'; choose one of HalfCheetah"):
+        Cell("test", "ppo", "beta", "Hopper-v5")
+    with pytest.raises(ValueError, match="no cell matches ant, x-\\*: use an arm \\(standard, printed"):
+        select(["standard", "ant", "x-*"])
+
+
+def test_selection_keeps_the_order() -> None:
+    cells = select(["beyond", "standard-hopper-ppo-*"])
+    assert [cell.arm for cell in cells] == ["standard"] * 3 + ["beyond"] * 18

@@ -1,0 +1,125 @@
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+
+import inbounds.robots
+from inbounds.learning import TrainConfig, ppo
+from inbounds.study import StudyFolder, evaluate, read_cell, run_cell, store, verify
+from inbounds.study.verify import TOLERANCE, Finding, check_rerun, first_mismatch
+from tests.study.small import folder_in, small_cell
+
+CELL = small_cell(epochs=10, keeps_policies=True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short_evaluations() -> Iterator[None]:
+    def make(config: TrainConfig, num_envs: int) -> Any:
+        return inbounds.robots.make(config.env, num_envs, max_episode_steps=40)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evaluate, "make_environments", make)
+        yield
+
+
+@pytest.fixture(scope="module")
+def done(short_evaluations: None, tmp_path_factory: pytest.TempPathFactory) -> StudyFolder:
+    folder = folder_in(tmp_path_factory.mktemp("done"))
+    run_cell(CELL, folder)
+    return folder
+
+
+@pytest.fixture
+def folder(done: StudyFolder, tmp_path: Path) -> StudyFolder:
+    """A copy to damage."""
+    shutil.copytree(done.results, tmp_path / "results")
+    return folder_in(tmp_path)
+
+
+def bad(findings: list[Finding]) -> list[str]:
+    return [f"{finding.subject}: {finding.message}" for finding in findings if not finding.ok]
+
+
+def republish(folder: StudyFolder, table: pa.Table | None = None, **metadata: Any) -> None:
+    path = folder.cell_file(CELL)
+    about = json.dumps(store.read_metadata(path) | metadata)
+    folder.publish({path: store.parquet_bytes(read_cell(path) if table is None else table, about)})
+
+
+def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
+    findings = verify([CELL, small_cell("trpo")], folder, epochs=10)
+    assert bad(findings) == []
+    assert [finding.message for finding in findings] == [
+        "3 of 3 files have their checksums",
+        "10 epochs repeated exactly",
+    ]
+
+
+def test_checksums_are_what_sha256sum_reads(folder: StudyFolder) -> None:
+    lines = (folder.results / "checksums.txt").read_text().splitlines()
+    assert [line.split("  ") for line in lines] == [
+        [store.sha256(folder.results / name), name]
+        for name in (
+            f"cells/{CELL.id}.parquet",
+            f"policies/{CELL.id}.parquet",
+            f"policies/{CELL.id}.safetensors",
+        )
+    ]
+
+
+def test_a_changed_byte_a_missing_and_a_foreign_file_are_found(folder: StudyFolder) -> None:
+    policies, returns = folder.policy_files(CELL)
+    policies.write_bytes(policies.read_bytes()[:-1] + b"?")
+    returns.rename(returns.with_name("foreign.parquet"))
+    (folder.results / "cells" / ".x.parquet.partial").touch()  # of a process that was killed
+    found = bad(verify([CELL], folder, rerun=()))
+    assert [line.partition(":")[0] for line in found] == [
+        f"policies/{CELL.id}.parquet",
+        f"policies/{CELL.id}.safetensors",
+        "policies/foreign.parquet",
+    ]
+
+
+def test_rows_cut_off_or_of_another_configuration_are_found(folder: StudyFolder) -> None:
+    republish(folder, read_cell(folder.cell_file(CELL)).slice(0, 18))
+    assert "18 rows instead of 20" in bad(verify([CELL], folder, rerun=()))[0]
+    assert "another configuration" in bad(verify([small_cell(epochs=20)], folder, rerun=()))[0]
+
+
+@pytest.mark.parametrize("column", ["return_mean", "greedy_return", "episodes", "kl"])
+def test_one_other_number_is_found(done: StudyFolder, column: str) -> None:
+    table = read_cell(done.cell_file(CELL))
+    values = table[column].to_pylist()
+    values[-1] = 7 if column == "episodes" else 0.123
+    index = table.column_names.index(column)
+    changed = table.set_column(
+        index, table.schema.field(column), pa.array(values, table.schema.field(column).type)
+    )
+    assert f"{column} is " in first_mismatch(table, changed)
+    assert "in epoch 9, seed 1" in first_mismatch(table, changed)
+    assert first_mismatch(table, table) == ""
+
+
+def test_another_engine_is_found(folder: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = ppo.clipped_surrogate
+    monkeypatch.setattr(ppo, "clipped_surrogate", lambda *args: 1.0001 * real(*args))
+    finding = check_rerun(CELL, folder, 10)
+    assert not finding.ok
+    assert "the engine now gives other results; a new study version is due" in finding.message
+
+
+def test_on_another_machine_the_first_rewards_are_compared(folder: StudyFolder) -> None:
+    about = store.read_metadata(folder.cell_file(CELL))
+    elsewhere = [about["sessions"][0] | {"processor": "abacus"}]
+    republish(folder, sessions=elsewhere)
+    finding = check_rerun(CELL, folder, 1)
+    assert finding.ok
+    assert "differ by at most 0.0e+00" in finding.message
+    rewards = about["first_rewards"]
+    rewards[1][15] += 3 * TOLERANCE
+    republish(folder, sessions=elsewhere, first_rewards=rewards)
+    assert not check_rerun(CELL, folder, 1).ok
