@@ -95,6 +95,7 @@ def test_interval_panels_show_value_and_interval_in_the_familys_look() -> None:
             assert markers[i].get_marker() == FAMILIES[family].marker
             assert to_hex(markers[i].get_markerfacecolor()) == FAMILIES[family].color.lower()
             assert markers[i].get_ydata()[0] == i
+            assert bars[i].get_linestyle() == "-", "a broken bar reads as another interval"
     assert "Marker: IQM. Bar: 95% bootstrap interval. n = 10 seeds." in words(fig)
     assert "unless" not in words(fig)
 
@@ -120,7 +121,7 @@ def test_differences_stand_beside_zero_with_their_corrected_p_value() -> None:
     assert first.lines[-1].get_xdata()[0] == 0.0
     assert first.texts[0].get_text() == "p < 0.001"
     assert second.texts[0].get_text() == "missing"
-    assert first.get_yticklabels()[0].get_text() == "Beta − Gaussian, clipped"
+    assert first.get_yticklabels()[0].get_text() == "Beta\n− Gaussian"
     assert "difference of IQMs" in words(fig)
     assert "after Holm's correction" in words(fig)
 
@@ -140,13 +141,28 @@ def test_profiles_are_drawn_as_given() -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 5, 6])
-def test_nothing_overlaps_or_leaves_the_figure(rows: int) -> None:
-    cells = {robot: {f: curve(i) for i, f in enumerate(FAMILIES)} for robot in ROBOTS[:rows]}
-    fig = study_figures.learning_curves(cells)
+@pytest.mark.parametrize("kind", ["curves", "bars", "differences"])
+def test_nothing_overlaps_or_leaves_the_figure(rows: int, kind: str) -> None:
+    robots = ROBOTS[:rows]
+    if kind == "curves":
+        fig = study_figures.learning_curves(
+            {r: {f: curve(i) for i, f in enumerate(FAMILIES)} for r in robots}
+        )
+    elif kind == "bars":
+        lost = estimate([np.nan, *scores(0)[1:]], missing="exclude")
+        fig = study_figures.interval_panels({r: dict.fromkeys(FAMILIES, lost) for r in robots})
+    else:
+        lost = statistics.difference(
+            [np.nan, *scores(0)[1:]], scores(1), np.random.default_rng(0), missing="exclude"
+        )
+        row = statistics.Comparison(lost, 0.0001, 0.0006)
+        pairs = [("logit-normal", "clipped-gaussian"), ("beta", "gaussian")]
+        fig = study_figures.difference_panels({r: dict.fromkeys(pairs, row) for r in robots})
     fig.draw_without_rendering()
     renderer = fig.canvas.get_renderer()
     boxes = [ax.get_tightbbox(renderer) for ax in fig.axes]
     boxes += [legend.get_window_extent(renderer) for legend in fig.legends]
+    boxes += [t.get_window_extent(renderer) for t in fig.texts if t.get_text()]  # heading and common labels
     for i, box in enumerate(boxes):
         assert box.x0 >= 0
         assert box.y0 >= 0

@@ -28,6 +28,7 @@ __all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "
 
 _QUIET = "#5F6770"
 _SMALL = 11.0  # font size of notes, in points
+_SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "logit-normal": "Logit-normal"}
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def _curve(ax: Any, family: str, curve: Curve) -> None:
         millions, curve.estimate.low, curve.estimate.high, color=style["color"], alpha=0.18, linewidth=0
     )
     first = list(FAMILIES).index(family) * every // len(FAMILIES)
-    ax.plot(millions, value, marker=FAMILIES[family].marker, markevery=(first, every), **style)
+    ax.plot(millions, value, marker=FAMILIES[family].marker, markevery=(first, every), linewidth=1.8, **style)
 
 
 def interval_panels(
@@ -151,13 +152,13 @@ def difference_panels(
         >>> a, b = {"Ant-v5": [5.0, 6.0, 7.0]}, {"Ant-v5": [1.0, 2.0, 4.0]}
         >>> row = compare(a, b, np.random.default_rng(0))["Ant-v5"]
         >>> fig = difference_panels({"Ant-v5": {("beta", "gaussian"): row}})
-        >>> [label.get_text() for label in fig.axes[0].get_yticklabels()]
-        ['Beta − Gaussian, clipped']
+        >>> fig.axes[0].get_yticklabels()[0].get_text().splitlines()
+        ['Beta', '− Gaussian']
     """
     pairs = list(dict.fromkeys(pair for cells in panels.values() for pair in cells))
     for family in {family for pair in pairs for family in pair}:
         family_style(family)
-    rows = {pair: (f"{FAMILIES[pair[0]].label} − {FAMILIES[pair[1]].label}", pair[0]) for pair in pairs}
+    rows = {pair: (f"{_SHORT[pair[0]]}\n− {_SHORT[pair[1]]}", pair[0]) for pair in pairs}
     cells = {
         title: {
             pair: (row.difference, _p_value(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
@@ -165,7 +166,13 @@ def difference_panels(
         }
         for title, given in panels.items()
     }
-    return _bars(cells, rows, xlabel, reference=0.0, remark="p: after Holm's correction over environments.")
+    return _bars(
+        cells,
+        rows,
+        xlabel,
+        reference=0.0,
+        remark="p: permutation test of the means, after Holm's correction over environments.",
+    )
 
 
 def _p_value(p: float) -> str:
@@ -181,7 +188,7 @@ def _bars(
 ) -> Figure:
     """Draw interval bars; `rows` gives each row's label and the family whose look it wears."""
     with use_style():
-        fig, axes = _grid(list(cells), row_height=0.95 + 0.42 * len(rows), sharey=True)
+        fig, axes = _grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True)
         for ax, given in zip(axes, cells.values(), strict=True):
             for place, (key, (estimate, remark_here)) in enumerate(given.items()):
                 _bar(ax, place, rows[key][1], estimate, remark_here)
@@ -192,9 +199,9 @@ def _bars(
             ax.tick_params(axis="y", length=0)
             ax.grid(visible=False, axis="y")
             ax.margins(x=0.12)
-            ax.xaxis.set_major_locator(MaxNLocator(4))
-        lowest = _lowest(axes)
-        fig.supxlabel(xlabel, fontsize=13) if len(lowest) > 1 else lowest[0].set_xlabel(xlabel)
+            ax.xaxis.set_major_locator(MaxNLocator(3))
+        # One label for all panels; below them it would lie on the note, which the layout engine places there.
+        fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
         drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
         _note(fig, "Marker", "Bar", drawn, "", remark)
     return fig
@@ -212,15 +219,15 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     if value.ndim:
         raise ValueError(f"expected one number a row, got an estimate of shape {value.shape}")
     look = FAMILIES[family]
-    ax.plot([low, high], [place, place], color=look.color, linewidth=2.2, solid_capstyle="butt")
+    ax.plot([low, high], [place, place], color=look.color, linewidth=2.2, linestyle="-")
     ax.plot(
         value, place, look.marker, color=look.color, markersize=8, markeredgewidth=1.8,
         markerfacecolor="white" if estimate.missing else look.color,
     )  # fmt: skip
     words = ", ".join(filter(None, [remark, _left_out(estimate)]))
     if words:
-        ax.annotate(
-            words, (value, place), (0, 7), textcoords="offset points", ha="center", va="bottom", fontsize=10
+        ax.text(
+            0.5, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="center", va="bottom", fontsize=10
         )
 
 
@@ -256,8 +263,15 @@ def performance_profiles(
                 ax.fill_between(tau, share.low, share.high, color=style["color"], alpha=0.18, linewidth=0)
                 every = max(1, len(tau) // 5)
                 first = list(FAMILIES).index(family) * every // len(FAMILIES)
-                ax.plot(tau, share.value, marker=FAMILIES[family].marker, markevery=(first, every), **style)
-        _list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()})
+                ax.plot(
+                    tau,
+                    share.value,
+                    marker=FAMILIES[family].marker,
+                    markevery=(first, every),
+                    linewidth=1.8,
+                    **style,
+                )
+        _list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_top=False)
         ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
         _legend(fig, families)
@@ -304,8 +318,8 @@ def _left_out(estimate: Estimate) -> str:
     return f"n = {estimate.n}, {estimate.missing} left out" if estimate.missing else ""
 
 
-def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None]) -> None:
-    """Write into a panel which families are missing, and which lost seeds."""
+def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_top: bool = True) -> None:
+    """Write into a panel which families are missing, and which lost seeds, on room of their own at the top."""
     lines = [
         f"{FAMILIES[family].label}: {_left_out(estimate) if estimate else 'missing'}"
         for family, estimate in cells.items()
@@ -313,9 +327,12 @@ def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None]) -> None:
     ]
     if lines:
         ax.text(
-            0.03, 0.97, "\n".join(lines), transform=ax.transAxes, ha="left", va="top", fontsize=10,
-            style="italic", bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
+            0.03, 0.98 if at_top else 0.05, "\n".join(lines), transform=ax.transAxes, ha="left",
+            va="top" if at_top else "bottom", fontsize=10, style="italic",
         )  # fmt: skip
+    if lines and at_top:
+        bottom, top = ax.get_ylim()
+        ax.set_ylim(bottom, top + 0.12 * len(lines) * (top - bottom))
 
 
 def _legend(fig: Figure, families: list[str]) -> None:
