@@ -15,6 +15,7 @@ import torch
 import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer, checkpoint
 from inbounds.learning.run_store import load_policies, policies_of
+from inbounds.learning.training import one_thread
 from inbounds.study import StudyError, StudyFolder, evaluate, read_cell, run_cell
 from inbounds.study.cell_run import DiskFullError, MeasuredTrainer
 from inbounds.study.claim import Claim, ClaimedError
@@ -52,7 +53,9 @@ def rows_of(folder: StudyFolder) -> pa.Table:
 @pytest.mark.parametrize(("algorithm", "family"), [("ppo", "logit-normal"), ("trpo", "beta")])
 def test_measuring_does_not_change_training(algorithm: str, family: str) -> None:
     cell = small_cell(algorithm, family, epochs=22)
-    plain, measured = Trainer(cell.config), MeasuredTrainer(cell)
+    with one_thread():
+        plain = Trainer(cell.config)
+    measured = MeasuredTrainer(cell)
     for _ in range(cell.epochs):
         plain.epoch()
         measured.epoch()
@@ -63,6 +66,19 @@ def test_measuring_does_not_change_training(algorithm: str, family: str) -> None
             np.testing.assert_array_equal(ours[name], theirs[name])
     for name, mean in measured.trainer.collector.normalizer.state_dict().items():  # type: ignore[union-attr]
         np.testing.assert_array_equal(mean, plain.collector.normalizer.state_dict()[name])  # type: ignore[union-attr]
+
+
+def test_the_number_of_threads_does_not_matter() -> None:
+    before, runs = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2):
+            torch.set_num_threads(threads)
+            runs.append(MeasuredTrainer(small_cell(epochs=1)))
+            runs[-1].epoch()
+    finally:
+        torch.set_num_threads(before)
+    one, two = (run.trainer.networks.actor.theta for run in runs)
+    assert torch.equal(one, two)
 
 
 @pytest.mark.parametrize("family", ["gaussian", "beta"])

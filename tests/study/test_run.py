@@ -1,3 +1,4 @@
+import io
 import os
 import re
 import signal
@@ -78,14 +79,14 @@ def quiet(cells: list[Cell], folder: StudyFolder, path: Path) -> StudyProgress:
 
 
 def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path) -> None:
-    cell, folder = small_cell(epochs=80), folder_in(tmp_path)
-    process = start(tmp_path, 80, jobs=1)
+    cell, folder = small_cell(epochs=30), folder_in(tmp_path)
+    process = start(tmp_path, 30, jobs=1)
     wait_until(lambda: has_checkpoint(folder, cell))
     pid = (read_claim(folder.work_of(cell)) or {})["pid"]
     assert pid != process.pid
     os.kill(pid, signal.SIGKILL)
     wait_until(
-        lambda: has_checkpoint(folder, cells_of(80)[1])
+        lambda: has_checkpoint(folder, cells_of(30)[1])
     )  # the next cell is under way: the first one is done
     os.killpg(process.pid, signal.SIGKILL)  # and now all of it, as when the machine goes down
     said, _ = process.communicate()
@@ -94,7 +95,7 @@ def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path)
     sessions = read_metadata(folder.cell_file(cell))["sessions"]
     assert [session["from_epoch"] % 10 for session in sessions] == [0, 0]
     assert sessions[1]["from_epoch"] > 0
-    assert run_cell(cells_of(80)[1], folder) == "finished"  # the claim of the dead falls at once
+    assert run_cell(cells_of(30)[1], folder) == "finished"  # the claim of the dead falls at once
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -198,19 +199,20 @@ def test_failures_are_reported_and_the_others_go_on(tmp_path: Path) -> None:
     folder.cell_file(broken).parent.mkdir(parents=True)
     folder.cell_file(broken).write_text("damaged")
     run_cell(good, folder)
-    progress = quiet([broken, good], folder, tmp_path / "said")
+    progress, said = quiet([broken, good], folder)
     summary = run_study([broken, good], folder, Settings(jobs=1), progress)
     assert {name: report.outcome for name, report in summary.reports.items()} == {
         broken.id: "failed",
         good.id: "was finished",
     }
     assert list(summary.failed) == [broken.id]
-    assert "restore it (git checkout" in (tmp_path / "said").read_text() or progress.console.file.close()
+    assert f"{broken.id}: failed: " in said.getvalue()
+    assert "restore it (git checkout" in said.getvalue()
 
 
 def test_no_cell_is_started_when_time_is_up(tmp_path: Path) -> None:
     folder, cells = folder_in(tmp_path), cells_of(1)
-    summary = run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder, tmp_path / "said"))
+    summary = run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0])
     assert summary.reports == {}
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from inbounds.learning import DivergedSeedWarning, Limits, Rollout, Trainer, checkpoint
 from inbounds.learning.run_files import DamagedFileError
 from inbounds.learning.run_store import load_checkpoint, save_policies
+from inbounds.learning.training import one_thread
 from inbounds.study import store
 from inbounds.study.claim import Claim
 from inbounds.study.evaluate import GreedyEvaluation, evaluate_finally
@@ -144,7 +145,8 @@ class MeasuredTrainer:
     def __init__(self, cell: Cell) -> None:
         self.config = cell.config
         self.progress = Progress()
-        self.trainer = Trainer(self.config)
+        with one_thread():  # orthogonal initial weights depend on the number of threads, in their last bits
+            self.trainer = Trainer(self.config)
         self.evaluation = GreedyEvaluation(self.trainer)
         self._collect = self.trainer.collector.collect
         self._rollout: Rollout | None = None
