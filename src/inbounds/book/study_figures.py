@@ -227,8 +227,9 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     words = ", ".join(filter(None, [remark, _left_out(estimate)]))
     if words:
         ax.text(
-            0.5, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="center", va="bottom", fontsize=10
-        )
+            0.5, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="center", va="bottom", fontsize=10,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
 
 
 def performance_profiles(
@@ -271,7 +272,7 @@ def performance_profiles(
                     linewidth=1.8,
                     **style,
                 )
-        _list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_top=False)
+        _list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
         ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
         _legend(fig, families)
@@ -318,8 +319,8 @@ def _left_out(estimate: Estimate) -> str:
     return f"n = {estimate.n}, {estimate.missing} left out" if estimate.missing else ""
 
 
-def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_top: bool = True) -> None:
-    """Write into a panel which families are missing, and which lost seeds, on room of their own at the top."""
+def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = True) -> None:
+    """Write into a panel which families are missing, and which lost seeds: at the left on room made for it."""
     lines = [
         f"{FAMILIES[family].label}: {_left_out(estimate) if estimate else 'missing'}"
         for family, estimate in cells.items()
@@ -327,10 +328,10 @@ def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_top: bool = 
     ]
     if lines:
         ax.text(
-            0.03, 0.98 if at_top else 0.05, "\n".join(lines), transform=ax.transAxes, ha="left",
-            va="top" if at_top else "bottom", fontsize=10, style="italic",
+            0.03 if at_left else 0.98, 0.98, "\n".join(lines), transform=ax.transAxes, va="top",
+            ha="left" if at_left else "right", fontsize=10, style="italic",
         )  # fmt: skip
-    if lines and at_top:
+    if lines and at_left:
         bottom, top = ax.get_ylim()
         ax.set_ylim(bottom, top + 0.12 * len(lines) * (top - bottom))
 
