@@ -168,6 +168,10 @@ def test_the_iqm_is_the_trimmed_mean_of_the_sample_repeated_four_times(values: l
     assert ours == pytest.approx(stats.trim_mean(np.repeat(values, 4), 0.25), rel=1e-9, abs=1e-9)
 
 
+def test_a_nan_among_the_values_is_not_trimmed_away() -> None:
+    assert np.isnan(statistics.interquartile_mean([1.0, 2.0, NAN, 3.0, 4.0, 5.0]))
+
+
 @given(st.lists(st.tuples(numbers, st.integers(0, 4)), min_size=1, max_size=10))
 @quick
 def test_weights_of_the_iqm_are_repetitions(pairs: list[tuple[float, int]]) -> None:
@@ -316,13 +320,13 @@ def test_the_probability_of_improvement_is_covered_near_the_edge_too(shift: floa
 
 
 def test_the_permutation_test_agrees_with_full_enumeration_of_welchs_t() -> None:
-    a, b = rng(1).normal(0.9, 2.0, 6), rng(2).normal(0, 1, 5)
-    pooled, everyone = np.concatenate([a, b]), range(11)
+    a, b = rng(1).normal(2.5, 4.0, 4), rng(2).normal(0, 1, 8)
+    pooled, everyone = np.concatenate([a, b]), range(12)
     splits = [
-        [*left, *(i for i in everyone if i not in left)] for left in itertools.combinations(everyone, 6)
+        [*left, *(i for i in everyone if i not in left)] for left in itertools.combinations(everyone, 4)
     ]
-    shuffled = pooled[np.array(splits)]  # [462, 11]
-    t = stats.ttest_ind(shuffled[:, :6], shuffled[:, 6:], axis=1, equal_var=False).statistic
+    shuffled = pooled[np.array(splits)]  # [495, 12]
+    t = stats.ttest_ind(shuffled[:, :4], shuffled[:, 4:], axis=1, equal_var=False).statistic
     exact = np.mean(np.abs(t) >= np.abs(t[0]) - 1e-9)
     ours = statistics.permutation_test(a, b, rng(), permutations=20_000)
     assert ours == pytest.approx(exact, abs=4 * np.sqrt(exact / 20_000))
@@ -340,10 +344,10 @@ def test_the_paired_test_flips_every_sign() -> None:
 def test_the_permutation_test_keeps_its_level_under_unequal_spread() -> None:
     g = rng(6)
     rejected = [
-        statistics.permutation_test(3 * g.normal(size=10), g.normal(size=10), g, permutations=199) <= 0.05
+        statistics.permutation_test(3 * g.normal(size=6), g.normal(size=14), g, permutations=199) <= 0.05
         for _ in range(500)
     ]
-    assert 0.02 <= np.mean(rejected) <= 0.085
+    assert 0.02 <= np.mean(rejected) <= 0.1  # without the studentisation about 0.2
 
 
 def test_seeds_without_scatter_are_no_division_by_zero() -> None:

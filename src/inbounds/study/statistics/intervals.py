@@ -72,7 +72,7 @@ def interquartile_mean(values: ArrayLike, weights: ArrayLike | None = None, axis
     two a side, a 20 % trimmed mean; here two and a half are cut, and doubling the data changes nothing.
 
     Args:
-        values: finite numbers.
+        values: finite numbers; a NaN among them makes the result NaN.
         weights: non-negative, broadcast against the values; equal by default.
         axis: over which to average.
 
@@ -97,9 +97,8 @@ def interquartile_mean(values: ArrayLike, weights: ArrayLike | None = None, axis
         array, mass = np.take_along_axis(array, order, -1), np.take_along_axis(mass, order, -1)
         mass = mass / mass.sum(-1, keepdims=True)
     upper = np.cumsum(mass, -1)
-    inside = np.minimum(upper, 0.75) - np.maximum(
-        upper - mass, 0.25
-    )  # length of each number's part of [¼, ¾]
+    # How much of each number's share of the distribution lies in [¼, ¾].
+    inside = np.minimum(upper, 0.75) - np.maximum(upper - mass, 0.25)
     return 2 * (np.maximum(inside, 0) * array).sum(-1)
 
 
