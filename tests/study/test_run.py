@@ -74,8 +74,9 @@ def has_checkpoint(folder: StudyFolder, cell: Cell) -> bool:
     return (folder.work_of(cell) / checkpoint.FILE_NAME).exists()
 
 
-def quiet(cells: list[Cell], folder: StudyFolder, path: Path) -> StudyProgress:
-    return StudyProgress(cells, folder, Console(file=open(path, "w"), width=200))
+def quiet(cells: list[Cell], folder: StudyFolder) -> tuple[StudyProgress, io.StringIO]:
+    said = io.StringIO()
+    return StudyProgress(cells, folder, Console(file=said, width=200)), said
 
 
 def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path) -> None:
@@ -98,7 +99,7 @@ def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path)
     assert run_cell(cells_of(30)[1], folder) == "finished"  # the claim of the dead falls at once
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signal.Signals) -> None:
     folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
     process = start(tmp_path, 100_000, jobs=1)
@@ -116,6 +117,7 @@ def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signa
     assert read_claim(folder.work_of(cell)) is None
 
 
+@pytest.mark.slow
 def test_processes_of_a_parent_that_was_killed_stop(tmp_path: Path) -> None:
     folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
     process = start(tmp_path, 100_000, jobs=1)
@@ -201,10 +203,8 @@ def test_failures_are_reported_and_the_others_go_on(tmp_path: Path) -> None:
     run_cell(good, folder)
     progress, said = quiet([broken, good], folder)
     summary = run_study([broken, good], folder, Settings(jobs=1), progress)
-    assert {name: report.outcome for name, report in summary.reports.items()} == {
-        broken.id: "failed",
-        good.id: "was finished",
-    }
+    outcomes = {name: report.outcome for name, report in summary.reports.items()}
+    assert outcomes == {broken.id: "failed", good.id: "was finished"}
     assert list(summary.failed) == [broken.id]
     assert f"{broken.id}: failed: " in said.getvalue()
     assert "restore it (git checkout" in said.getvalue()
@@ -212,8 +212,7 @@ def test_failures_are_reported_and_the_others_go_on(tmp_path: Path) -> None:
 
 def test_no_cell_is_started_when_time_is_up(tmp_path: Path) -> None:
     folder, cells = folder_in(tmp_path), cells_of(1)
-    summary = run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0])
-    assert summary.reports == {}
+    assert run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0]).reports == {}
 
 
 def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
