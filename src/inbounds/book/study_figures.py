@@ -10,8 +10,7 @@ results of `inbounds.study.statistics`; nothing here reads a file or computes a 
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,12 +21,21 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
 from inbounds.book.figures import FAMILIES, WIDTH, family_style, use_style
+from inbounds.book.study_panels import (
+    SMALL,
+    families_in,
+    family_legend,
+    left_out,
+    list_gaps,
+    lowest,
+    note,
+    panel_grid,
+)
 from inbounds.study.statistics import Comparison, Estimate, Profile
 
 __all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "performance_profiles"]
 
 _QUIET = "#5F6770"
-_SMALL = 11.0  # font size of notes, in points
 _SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "logit-normal": "Logit-normal"}
 
 
@@ -62,22 +70,22 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
         >>> [text.get_text() for text in fig.axes[0].texts]
         ['Logit-normal: missing']
     """
-    families = _families(curves.values())
+    families = families_in(curves.values())
     with use_style():
-        fig, axes = _grid(list(curves), row_height=2.55)
+        fig, axes = panel_grid(list(curves), row_height=2.55)
         for ax, cells in zip(axes, curves.values(), strict=True):
             for family, curve in cells.items():
                 if curve is not None:
                     _curve(ax, family, curve)
-            _list_gaps(ax, {family: c.estimate if c else None for family, c in cells.items()})
+            list_gaps(ax, {family: c.estimate if c else None for family, c in cells.items()})
             ax.yaxis.set_major_locator(MaxNLocator(5))
             ax.xaxis.set_major_locator(MaxNLocator(5))
         fig.supylabel(ylabel, fontsize=13)
-        for ax in _lowest(axes):
+        for ax in lowest(axes):
             ax.set_xlabel("environment steps [millions]")
-        _legend(fig, families)
+        family_legend(fig, families)
         drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
-        _note(fig, "Line", "Band", drawn, ", at each epoch by itself")
+        note(fig, "Line", "Band", drawn, ", at each epoch by itself")
     return fig
 
 
@@ -124,7 +132,7 @@ def interval_panels(
         >>> [label.get_text() for label in fig.axes[0].get_yticklabels()]
         ['Gaussian, clipped', 'Beta']
     """
-    families = _families(panels.values())
+    families = families_in(panels.values())
     rows = {family: (FAMILIES[family].label, family) for family in families}
     cells = {title: {f: (rows_of.get(f), "") for f in families} for title, rows_of in panels.items()}
     return _bars(cells, rows, xlabel, reference)
@@ -188,7 +196,7 @@ def _bars(
 ) -> Figure:
     """Draw interval bars; `rows` gives each row's label and the family whose look it wears."""
     with use_style():
-        fig, axes = _grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True)
+        fig, axes = panel_grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True)
         for ax, given in zip(axes, cells.values(), strict=True):
             for place, (key, (estimate, remark_here)) in enumerate(given.items()):
                 _bar(ax, place, rows[key][1], estimate, remark_here)
@@ -203,7 +211,7 @@ def _bars(
         # One label for all panels; below them it would lie on the note, which the layout engine places there.
         fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
         drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
-        _note(fig, "Marker", "Bar", drawn, "", remark)
+        note(fig, "Marker", "Bar", drawn, "", remark)
     return fig
 
 
@@ -212,7 +220,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     if estimate is None:
         ax.text(
             0.5, place, "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
-            style="italic", color=_QUIET, fontsize=_SMALL,
+            style="italic", color=_QUIET, fontsize=SMALL,
         )  # fmt: skip
         return
     value, low, high = (np.asarray(x) for x in (estimate.value, estimate.low, estimate.high))
@@ -224,7 +232,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
         value, place, look.marker, color=look.color, markersize=8, markeredgewidth=1.8,
         markerfacecolor="white" if estimate.missing else look.color,
     )  # fmt: skip
-    words = ", ".join(filter(None, [remark, _left_out(estimate)]))
+    words = ", ".join(filter(None, [remark, left_out(estimate)]))
     if words:
         ax.text(
             0.5, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="center", va="bottom", fontsize=10,
@@ -254,7 +262,7 @@ def performance_profiles(
         >>> fig.axes[0].get_xlabel()
         'normalised score τ'
     """
-    families = _families([profiles])
+    families = families_in([profiles])
     with use_style():
         fig, ax = plt.subplots(figsize=(WIDTH, 4.6))
         for family, profile in profiles.items():
@@ -272,92 +280,9 @@ def performance_profiles(
                     linewidth=1.8,
                     **style,
                 )
-        _list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
+        list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
         ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
-        _legend(fig, families)
-        _note(fig, "Line", "Band", [p.share for p in profiles.values() if p], ", at each τ by itself")
+        family_legend(fig, families)
+        note(fig, "Line", "Band", [p.share for p in profiles.values() if p], ", at each τ by itself")
     return fig
-
-
-# --- what the figures share --------------------------------------------------------------------------------------
-
-
-def _families(panels: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return the families of all panels in the book's order, or say that one is unknown."""
-    named = {family for cells in panels for family in cells}
-    for family in named:
-        family_style(family)
-    if not named:
-        raise ValueError("nothing to draw: pass at least one policy family, None where it is missing")
-    return [family for family in FAMILIES if family in named]
-
-
-def _grid(titles: list[str], row_height: float, *, sharey: bool = False) -> tuple[Figure, list[Any]]:
-    """Return a figure of titled panels, two a row (one where there is one), without empty ones."""
-    if not titles:
-        raise ValueError("nothing to draw: pass at least one panel")
-    columns = min(2, len(titles))
-    rows = -(-len(titles) // columns)
-    fig, axes = plt.subplots(
-        rows, columns, squeeze=False, sharey=sharey, figsize=(WIDTH, 1.3 + row_height * rows)
-    )
-    panels = list(axes.flat)
-    for ax in panels[len(titles) :]:
-        ax.remove()
-    for ax, title in zip(panels, titles, strict=False):
-        ax.set_title(title)
-    return fig, panels[: len(titles)]
-
-
-def _lowest(axes: list[Any]) -> list[Any]:
-    """Return the panels with none below them."""
-    return axes[-2:] if len(axes) > 1 else axes
-
-
-def _left_out(estimate: Estimate) -> str:
-    return f"n = {estimate.n}, {estimate.missing} left out" if estimate.missing else ""
-
-
-def _list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = True) -> None:
-    """Write into a panel which families are missing, and which lost seeds: at the left on room made for it."""
-    lines = [
-        f"{FAMILIES[family].label}: {_left_out(estimate) if estimate else 'missing'}"
-        for family, estimate in cells.items()
-        if estimate is None or estimate.missing
-    ]
-    if lines:
-        ax.text(
-            0.03 if at_left else 0.98, 0.98, "\n".join(lines), transform=ax.transAxes, va="top",
-            ha="left" if at_left else "right", fontsize=10, style="italic",
-        )  # fmt: skip
-    if lines and at_left:
-        bottom, top = ax.get_ylim()
-        ax.set_ylim(bottom, top + 0.12 * len(lines) * (top - bottom))
-
-
-def _legend(fig: Figure, families: list[str]) -> None:
-    """One legend above all panels, of every family that has a place in the figure."""
-    handles = [
-        plt.Line2D([], [], marker=FAMILIES[family].marker, **family_style(family)) for family in families
-    ]
-    fig.legend(handles=handles, loc="outside upper center", ncols=2 if len(families) in (2, 4) else 3)
-
-
-def _note(fig: Figure, mark: str, band: str, drawn: list[Estimate], where: str, remark: str = "") -> None:
-    """Say below the panels what is drawn, what the interval is, and of how many seeds: one kind a figure."""
-    kinds = sorted({(estimate.statistic, estimate.level) for estimate in drawn})
-    if len(kinds) > 1:
-        raise ValueError(f"one figure, one statistic and one level; got {kinds}: draw them apart")
-    text = "No cell is complete yet."
-    for statistic, level in kinds:
-        whole = sorted({estimate.n for estimate in drawn if not estimate.missing})
-        seeds = " to ".join(map(str, dict.fromkeys([whole[0], whole[-1]]))) if whole else ""
-        count = (
-            f" n = {seeds} seeds{' unless noted' if any(e.missing for e in drawn) else ''}." if seeds else ""
-        )
-        text = f"{mark}: {statistic}. {band}: {level:.0%} bootstrap interval{where}.{count} {remark}"
-    # A legend of nothing but its title: the layout engine keeps room for it below the panels.
-    fig.legend(
-        handles=[], title=textwrap.fill(text.strip(), 88), title_fontsize=_SMALL, loc="outside lower left"
-    )
