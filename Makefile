@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 NB ?= $(wildcard notebooks/[0-9]*.ipynb)
 PORT ?= 8000
 
-.PHONY: help setup book test check format notebooks pages serve lab dist bench study clean distclean
+.PHONY: help setup book test check format notebooks pages serve lab bench dist clean distclean
 
 help:  ## list these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -43,6 +43,9 @@ serve: book  ## preview the built book on this machine  (PORT=8000)
 
 lab: setup  ## open JupyterLab on the notebooks
 	@$(PY) -m jupyterlab --notebook-dir=notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
+
+bench: setup  ## measure speed beside peers and beside the physics floor  (about 15 min, quiet machine)
+	@$(PY) -m benchmarks.run
 
 dist: book  ## zip the built book for reading offline
 	@$(PY) tools/build_book.py --zip
