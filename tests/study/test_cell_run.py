@@ -17,9 +17,10 @@ from inbounds.learning import TrainConfig, Trainer, checkpoint
 from inbounds.learning.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
 from inbounds.study import StudyError, StudyFolder, evaluate, read_cell, run_cell
-from inbounds.study.cell_run import DiskFullError, MeasuredTrainer
+from inbounds.study.cell_run import DiskFullError
 from inbounds.study.claim import Claim, ClaimedError
 from inbounds.study.evaluate import generator_of
+from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.store import COLUMNS, EVERY_EPOCH, MEASURED, read_metadata
 from inbounds.study.verify import first_mismatch
 from tests.study.small import folder_in, small_cell, stop_after

@@ -25,6 +25,10 @@ EXAMPLES = {
     "bench": """\
   inbounds bench
   inbounds bench --help""",
+    "study": """\
+  inbounds study status
+  inbounds study run standard --nice 19 --max-minutes 60
+  inbounds study verify""",
 }
 
 
@@ -57,6 +61,10 @@ def _run(args: list[str]) -> int:
     try:
         if args[:1] == ["bench"] and benchmark.find_root():
             return benchmark.run(args[1:])  # its options are its own
+        if args[:1] == ["study"]:
+            from inbounds.study.command import study
+
+            return study(args[1:])
         command = options.parse(args)
         if isinstance(command, options.Train):
             return training.run(command)

@@ -150,8 +150,16 @@ class Bench:
     """
 
 
-Command: TypeAlias = Train | Watch | Bench
-COMMANDS: dict[str, type[Command]] = {"train": Train, "watch": Watch, "bench": Bench}
+@dataclass(frozen=True)
+class Study:
+    """Run the book's study: all algorithms, families and robots, ten seeds each.
+
+    `inbounds study --help` shows its own commands and options.
+    """
+
+
+Command: TypeAlias = Train | Watch | Bench | Study
+COMMANDS: dict[str, type[Command]] = {"train": Train, "watch": Watch, "bench": Bench, "study": Study}
 
 
 def parse(args: Sequence[str]) -> Command:

@@ -74,7 +74,8 @@ class Trainer:
         policy = Policy(config.policy, space.low, space.high)
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
-        self.networks = ActorCritic(policy, obs_dim, config.network, generators)
+        with one_thread():  # orthogonal initial weights depend on the number of threads, in their last bits
+            self.networks = ActorCritic(policy, obs_dim, config.network, generators)
         self.collector = Collector(
             self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode
         )

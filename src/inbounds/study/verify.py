@@ -21,8 +21,8 @@ from inbounds.learning import TrainConfig
 from inbounds.learning.run_files import DamagedFileError
 from inbounds.learning.training import describe
 from inbounds.study import store
-from inbounds.study.cell_run import MeasuredTrainer
 from inbounds.study.grid import STUDY_VERSION, Cell
+from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.provenance import provenance
 from inbounds.study.store import CHECKSUMS_FILE, StudyFolder
 
