@@ -48,7 +48,6 @@ def test_killed(mutant: Mutant, tmp_path: Path) -> None:
     assert done.returncode == 1, (
         f"{mutant.name} survived {mutant.test}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
     )
-    assert str(copy) in done.stdout or "AssertionError" in done.stdout or "Error" in done.stdout
 
 
 @pytest.mark.slow
