@@ -145,7 +145,7 @@ def test_missing_mediapy_names_the_fix(monkeypatch):
         videos.show_films({"One": film()})
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+@pytest.mark.pages
 def test_chromium_plays_it_on_a_phone(tmp_path):
     from playwright.sync_api import sync_playwright
 
