@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import platform
@@ -22,6 +23,22 @@ FORMAT = 1
 
 class DamagedFileError(ValueError):
     """A file of a run is cut short, damaged, or of another origin; the message names file and remedy."""
+
+
+def is_disk_full(error: BaseException | None) -> bool:
+    """Tell whether an error, or what led to it, is a disk (or a quota) without room.
+
+    torch reports a write that failed half-way as a RuntimeError of its own, which has the cause as its context.
+
+    Example:
+        >>> is_disk_full(OSError(errno.ENOSPC, "No space left on device")), is_disk_full(OSError(errno.EACCES, "no"))
+        (True, False)
+    """
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def find(run: str | Path, name: str) -> Path:

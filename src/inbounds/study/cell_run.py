@@ -7,7 +7,6 @@ checkpoint as the epoch that they belong to.
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import time
 import warnings
@@ -19,7 +18,7 @@ import pyarrow as pa
 import safetensors
 
 from inbounds.learning import checkpoint
-from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.run_files import DamagedFileError, is_disk_full
 from inbounds.learning.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.claim import Claim
@@ -227,12 +226,3 @@ _RETURNS = pa.schema(
         pa.field("length", pa.int32(), nullable=False),
     ]
 )
-
-
-def is_disk_full(error: BaseException | None) -> bool:
-    """Tell whether an error, or what led to it, is a disk (or a quota) without room."""
-    while error is not None:
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
