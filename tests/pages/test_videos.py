@@ -1,8 +1,13 @@
 """Videos in the built book play when the reader asks, and end."""
 
-import pytest
-from playwright.sync_api import BrowserContext
+from pathlib import Path
 
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, BrowserContext
+
+from inbounds.book import videos
+from inbounds.robots import Film
 from tests.pages import browser as book
 
 PAGES = book.pages("<video")
@@ -41,3 +46,21 @@ def test_videos_stop_at_their_end(context: BrowserContext, address: str, name: s
     video.evaluate("node => { node.muted = true; node.playbackRate = 8; return node.play(); }")
     video.evaluate("node => node.ended || new Promise((done) => node.addEventListener('ended', done))")
     assert video.evaluate("node => node.paused || node.ended")
+
+
+def test_two_films_fit_a_phone_and_play_to_their_end(browser: Browser, tmp_path: Path) -> None:
+    film = Film(np.full((25, 240, 320, 3), 60, np.uint8), 25.0, 0.0)  # one second
+    row = videos.show_films({"One": film, "Two": film})
+    head = '<!doctype html><meta name="viewport" content="width=device-width">'
+    (tmp_path / "index.html").write_text(f"{head}<body>{row._repr_html_()}", encoding="utf8")
+    with book.served(tmp_path) as address:
+        page = browser.new_page(viewport={"width": 320, "height": 640})
+        page.goto(address + "index.html")
+        page.wait_for_function("[...document.querySelectorAll('video')].every(v => v.readyState >= 1)")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 320
+        start = page.evaluate("[...document.querySelectorAll('video')].map(v => [v.paused, v.currentTime])")
+        assert start == [[True, 0], [True, 0]]
+        assert page.evaluate("document.querySelector('video').duration") == pytest.approx(1.0, abs=0.05)
+        page.evaluate("document.querySelector('video').play()")
+        page.wait_for_function("document.querySelector('video').ended", timeout=10_000)
+        page.close()

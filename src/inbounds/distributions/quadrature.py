@@ -11,7 +11,7 @@ and the rules differ only in the nodes x_i and the weights w_i:
   analytic in a strip of half-width d (Trefethen & Weideman 2014, section 5). For f = sigmoid the nearest pole
   is z = ±iπ, so d = π/σ: a hundred nodes are enough for every σ ≤ e.
 * `gauss_hermite` — exact for polynomials, for comparison. The sigmoid is no polynomial: beyond σ ≈ 1 the rule
-  needs many nodes (chapter 2 measures both).
+  needs many nodes (the chapter on the logit-normal density measures both).
 * `graded_trapezoid` — the trapezoid rule after x = x₀ + sinh(u)/r, which crowds the nodes around z = 0, where
   sigmoid and softplus bend, once σ is wide. It is the plain rule for small σ and still right where σ is in the
   thousands. The distributions of this package use it.
