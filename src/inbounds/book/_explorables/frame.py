@@ -21,7 +21,7 @@ import html
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,8 @@ _COLORS = {
     },
 }  # fmt: skip
 
-_DASHES: dict[str, list[int]] = {"-": [], "--": [9, 4], "-.": [9, 4, 2, 4], ":": [2, 4]}
+DASHES: dict[str, list[int]] = {"-": [], "--": [9, 4], "-.": [9, 4, 2, 4], ":": [2, 4]}
+"""Matplotlib's line styles as BokehJS draws them [pixels on, off, …]."""
 
 
 def javascript_files() -> list[Path]:
@@ -91,11 +92,13 @@ class Explorable:
     plots: tuple[figure, ...]
     """Bokeh figures; their data sources and ranges are named like the model's results."""
     columns: Mapping[str, str]
-    """Columns of the table: policy family (which gives colour and line style) and heading."""
+    """Columns of the table: a key of ``looks`` (which gives colour and line style) and heading."""
     rows: Mapping[str, str]
     """Rows of the table: key in the model's ``table``, and heading."""
     fallback: Callable[[], Figure]
     """Draws the static figure at the initial values."""
+    looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.FAMILIES)
+    """The look of every curve: the policy families', where the curves are families."""
 
     def __post_init__(self) -> None:
         """Check the name, and make every control recompute the page."""
@@ -144,7 +147,7 @@ class Explorable:
         return (
             f'<div class="inbounds-explorable" data-model="{self.name}" data-alt="{alt}" role="group" '
             f'aria-label="{html.escape(self.title)}">'
-            f"<style>{_style_sheet()}</style>"
+            f"<style>{_style_sheet(tuple(self.looks.items()))}</style>"
             f'<div class="inbounds-static"><img src="{self._static_image}" alt="{alt}"></div>'
             f'<div class="inbounds-live"><div class="inbounds-plot"></div>{self._table()}'
             f'<p class="inbounds-note" aria-live="polite"></p></div>'
@@ -154,7 +157,10 @@ class Explorable:
 
     def _table(self) -> str:
         """The table of read-outs; its header is the legend of the plot."""
-        heads = "".join(f'<th scope="col">{_swatch(key)}{text}</th>' for key, text in self.columns.items())
+        heads = "".join(
+            f'<th scope="col">{_swatch(key, self.looks[key])}{text}</th>'
+            for key, text in self.columns.items()
+        )
         cells = "<td></td>" * len(self.columns)
         body = "".join(
             f'<tr data-row="{key}"><th scope="row">{text}</th>{cells}</tr>' for key, text in self.rows.items()
@@ -190,16 +196,16 @@ def _with_fixed_ids(item: Any, name: str) -> Any:
 
 
 @functools.cache
-def _style_sheet() -> str:
-    """The style of an explorable, with the colours of the book's families for both themes."""
-    families = {
-        "light": {family: look.color for family, look in figures.FAMILIES.items()},
-        "dark": {family: look.color_on_dark for family, look in figures.FAMILIES.items()},
+def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
+    """The style of an explorable, with the colours of its curves for both themes."""
+    curves = {
+        "light": {name: look.color for name, look in looks},
+        "dark": {name: look.color_on_dark for name, look in looks},
     }
     blocks = []
     for selector, palette in (
-        ("", _COLORS["light"] | families["light"]),
-        ('[data-theme="dark"]', _COLORS["dark"] | families["dark"]),
+        ("", _COLORS["light"] | curves["light"]),
+        ('[data-theme="dark"]', _COLORS["dark"] | curves["dark"]),
     ):
         variables = " ".join(f"--inbounds-{key}: {value};" for key, value in palette.items())
         blocks.append(f".inbounds-explorable{selector} {{ {variables} }}")
@@ -222,12 +228,12 @@ def _scripts() -> str:
     return f"<script>{load}</script>"
 
 
-def _swatch(family: str) -> str:
-    """A short line in a family's colour and dash."""
-    dashes = " ".join(map(str, _DASHES[figures.FAMILIES[family].linestyle]))
+def _swatch(name: str, look: figures.FamilyStyle) -> str:
+    """A short line in a curve's colour and dash."""
+    dashes = " ".join(map(str, DASHES[look.linestyle]))
     return (
         '<svg width="44" height="6" aria-hidden="true"><line x1="0" y1="3" x2="44" y2="3" stroke-width="3" '
-        f'stroke="var(--inbounds-{family})" stroke-dasharray="{dashes}"/></svg>'
+        f'stroke="var(--inbounds-{name})" stroke-dasharray="{dashes}"/></svg>'
     )
 
 
@@ -270,6 +276,17 @@ def plot(
 
 def family_curve(fig: figure, family: str) -> None:
     """Add a policy family's curve, empty; the model fills the source of the same name with ``x`` and ``y``."""
-    source = ColumnDataSource({"x": [], "y": []}, name=family)
-    dash = _DASHES[figures.FAMILIES[family].linestyle]
-    fig.line("x", "y", source=source, name=family, line_width=3, line_dash=dash)
+    curve(fig, family, figures.FAMILIES[family], source=family)
+
+
+def curve(fig: figure, name: str, look: figures.FamilyStyle, *, source: str) -> None:
+    """Add an empty curve.
+
+    Args:
+        fig: The figure.
+        name: The curve's key in the explorable's ``looks``, by which the page colours it.
+        look: Its look.
+        source: The key under which the model gives its ``x`` and ``y``; unique in the explorable.
+    """
+    data = ColumnDataSource({"x": [], "y": []}, name=source)
+    fig.line("x", "y", source=data, name=name, line_width=3, line_dash=DASHES[look.linestyle])
