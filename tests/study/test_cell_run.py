@@ -16,12 +16,12 @@ import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer, checkpoint
 from inbounds.learning.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
-from inbounds.study import StudyError, StudyFolder, evaluate, read_cell, run_cell
+from inbounds.study import Cell, StudyError, StudyFolder, evaluate, read_cell, run_cell
 from inbounds.study.cell_run import DiskFullError
 from inbounds.study.claim import Claim, ClaimedError
 from inbounds.study.evaluate import generator_of
 from inbounds.study.measure import MeasuredTrainer
-from inbounds.study.store import COLUMNS, EVERY_EPOCH, MEASURED, read_metadata
+from inbounds.study.store import COLUMNS, EVERY_EPOCH, MEASURED, read_metadata, table_of
 from inbounds.study.verify import first_mismatch
 from tests.study.small import folder_in, small_cell, stop_after
 
@@ -94,7 +94,34 @@ def test_the_greedy_return_is_that_of_gymnasium(family: str) -> None:
         for _ in range(LIMIT):
             obs, reward, *_ = env.step(policy.act(obs))
             total += float(reward)
-        assert run.progress.measurements[0]["greedy_return"][i] == pytest.approx(total, rel=1e-4, abs=1e-3)
+        assert run.progress.measurements[-1]["greedy_return"][i] == pytest.approx(total, rel=1e-4, abs=1e-3)
+
+
+def starts_of(cell: Cell, epochs: int, patch: pytest.MonkeyPatch) -> list[list[int]]:
+    """The starts of the evaluations of a run."""
+    starts, real = [], evaluate.play
+    with patch.context() as context:
+        context.setattr(evaluate, "play", lambda envs, act, s: starts.append(list(s)) or real(envs, act, s))
+        run = MeasuredTrainer(cell)
+        for _ in range(epochs):
+            run.epoch()
+        evaluate.evaluate_finally(run.trainer)
+    return starts
+
+
+def test_where_evaluations_start_depends_on_seed_and_epoch_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = starts_of(small_cell(epochs=10), 10, monkeypatch)
+    other = small_cell(
+        "trpo", "logit-normal", seeds=(1, 5, 0), overrides=(("horizon", 96), ("minibatch_size", 32))
+    )
+    others = starts_of(other, 10, monkeypatch)
+    first, tenth, *finally_ = plain
+    assert not set(first) & set(tenth)
+    assert [[s[2], s[0]] for s in others[:2]] == [first, tenth]
+    assert len(finally_) == len(others[2:]) == 4  # mean, median, mode, sample
+    assert all(starts == finally_[0] for starts in finally_)
+    assert all(starts[20:] + starts[:10] == finally_[0] for starts in others[2:])
+    assert len({*first, *tenth, *finally_[0]}) == 2 + 2 + 20
 
 
 def test_rows_have_the_schema(whole: pa.Table) -> None:
@@ -104,7 +131,8 @@ def test_rows_have_the_schema(whole: pa.Table) -> None:
     assert not {"accepted", "alpha_q50"} & set(names)
     assert whole["seed"].to_pylist()[:4] == [0, 1, 0, 1]
     assert whole["env_steps"].to_pylist()[-1] == 30 * 64
-    measured = whole["epoch"].to_numpy() % 10 == 9
+    epoch = whole["epoch"].to_numpy()
+    measured = (epoch == 0) | (epoch % 10 == 9)
     for name in names:
         assert whole.schema.field(name).type == COLUMNS[name][0]
         assert whole.schema.field(name).metadata == {b"meaning": COLUMNS[name][1].encode()}
@@ -268,6 +296,23 @@ def test_a_diverged_seed_is_marked_and_the_cell_goes_on(tmp_path: Path) -> None:
             run.epoch()
     table = run.table()
     assert table["diverged"].to_pylist()[-2:] == [False, True]
-    greedy = table["greedy_return"].to_pylist()[-2:]
-    assert np.isfinite(greedy[0])
-    assert np.isnan(greedy[1])
+    for name in ("greedy_return", "action_std", "kl"):
+        good, bad = table[name].to_pylist()[-2:]
+        assert np.isfinite(good), name
+        assert np.isnan(bad), f"{name}: the robot of a diverged seed goes on, but it is nobody's result"
+
+
+def test_rows_end_with_the_epoch_in_which_a_seed_diverged() -> None:
+    """What a robot does while it has no policy, it stands still and its episodes end, is no result."""
+    config = small_cell(epochs=3).config
+    records = [
+        {"epoch": e, "env_steps": 64 * (e + 1), "seconds": 1.0, "episodes": np.array([2, 2])}
+        | {"return_mean": np.array([10.0 + e, 20.0 + e]), "diverged": np.array([False, e > 0])}
+        for e in range(3)
+    ]
+    measured = {"epoch": 2, "kl": np.array([0.1, 0.2]), "evaluation_seconds": 1.0}
+    table = table_of(config, records, [measured])
+    assert np.array_equal(table["return_mean"], [10, 20, 11, 21, 12, np.nan], equal_nan=True)
+    assert table["episodes"].to_pylist() == [2, 2, 2, 2, 2, 0]
+    assert np.isnan(table["kl"].to_pylist()[-1])
+    assert table["evaluation_seconds"].to_pylist()[-1] == 1

@@ -7,6 +7,7 @@ import pytest
 from inbounds.learning import preset
 from inbounds.learning.training import describe
 from inbounds.study.grid import ARMS, ROBOTS, VARIANTS, Cell, select, study_cells
+from inbounds.study.statistics import settings
 
 PROTOCOL = Path(__file__).parents[2] / "results" / "PROTOCOL.md"
 
@@ -37,6 +38,21 @@ def test_the_variants_are_those_of_the_protocol() -> None:
         assert sum(cell.variant in variants for cell in ARMS["mechanisms"]) == int(cells[5])
         named |= dict.fromkeys(variants)
     assert named.keys() == VARIANTS.keys() - {""}
+
+
+def test_the_numbers_of_the_analysis_are_those_of_the_protocol() -> None:
+    table = PROTOCOL.read_text().partition("| Number | Value |")[2].partition("\n\n")[0]
+    values = [line.split("|")[2].strip() for line in table.splitlines()[2:]]
+    numbers = [float(value.removesuffix(" %")) / (100 if "%" in value else 1) for value in values]
+    assert numbers == [
+        settings.LEVEL,
+        settings.RESAMPLES,
+        settings.CURVE_RESAMPLES,
+        settings.PROFILE_RESAMPLES,
+        settings.PERMUTATIONS,
+        settings.FINAL_FRACTION,
+        settings.LAST_EVALUATIONS,
+    ]
 
 
 def test_ids_and_digests_are_unique_but_for_nothing() -> None:

@@ -26,9 +26,10 @@ def rng(seed: int = 0) -> np.random.Generator:
 # --- endpoints ---------------------------------------------------------------------------------------------------
 
 
-def test_the_area_is_the_trapezoids_over_the_length() -> None:
+def test_the_area_is_that_of_the_bars_over_their_length() -> None:
     curves = rng().normal(size=(2, 3, 50))
-    assert np.allclose(statistics.area_under_curve(curves), np.trapezoid(curves, np.linspace(0, 1, 50)))
+    bars = np.repeat(curves, 20, -1)  # each epoch as wide as the next
+    assert np.allclose(statistics.area_under_curve(curves), bars.sum(-1) / bars.shape[-1])
     assert statistics.area_under_curve([[7.0]]).tolist() == [7.0]
 
 
@@ -46,14 +47,21 @@ def test_a_hole_in_a_curve_makes_its_endpoints_missing_and_no_others() -> None:
     assert np.isnan(statistics.area_under_curve(curves)).tolist() == [False, True, True]
 
 
-def test_gaps_are_filled_while_a_seed_is_alive_and_never_after_it_diverged() -> None:
-    curves = np.array([[NAN, 2.0, NAN, NAN, 5.0], [1.0, NAN, 3.0, NAN, NAN]])
-    alive = np.array([[True] * 5, [True, True, True, False, False]])
-    filled = statistics.carry_forward(curves, alive)
-    assert np.array_equal(filled, [[NAN, 2, 2, 2, 5], [1, 1, 3, NAN, NAN]], equal_nan=True)
+def test_gaps_take_the_last_known_return_and_the_first_where_there_is_none_before() -> None:
+    curves = np.array([[NAN, 2.0, NAN, NAN, 5.0], [1.0, NAN, 3.0, NAN, NAN], [NAN] * 5])
+    filled = statistics.carry_forward(curves)
+    assert np.array_equal(filled, [[2, 2, 2, 2, 5], [1, 1, 3, 3, 3], [NAN] * 5], equal_nan=True)
     assert np.isnan(curves[0, 2]), "the caller's array was changed"
     with pytest.raises(MissingSeedError):
         statistics.bootstrap(statistics.final_score(filled, 0.4), rng())
+
+
+@given(st.lists(st.one_of(st.just(NAN), numbers), min_size=1, max_size=8))
+@quick
+def test_filling_looks_back_and_then_ahead(curve: list[float]) -> None:
+    for epoch, filled in enumerate(statistics.carry_forward([curve])[0]):
+        nearest = [x for x in curve[epoch::-1] + curve[epoch:] if not np.isnan(x)]
+        assert filled == nearest[0] if nearest else np.isnan(filled)
 
 
 def test_normalised_scores_are_0_and_1_at_the_references() -> None:

@@ -1,6 +1,6 @@
 """One cell, from its last checkpoint to its file in the results, in this process.
 
-The loop is the one of `inbounds.learning.train`, plus measurements every tenth epoch, which must be in the same
+The loop is the one of `inbounds.learning.train`, plus measurements after some epochs, which must be in the same
 checkpoint as the epoch that they belong to.
 """
 
@@ -22,7 +22,7 @@ from inbounds.learning.run_files import DamagedFileError, is_disk_full
 from inbounds.learning.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.claim import Claim
-from inbounds.study.evaluate import evaluate_finally
+from inbounds.study.evaluate import GREEDY, evaluate_finally
 from inbounds.study.grid import STUDY_VERSION, Cell
 from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.provenance import provenance
@@ -112,8 +112,19 @@ class _CellRun:
         self.run_ = MeasuredTrainer(cell)
         self._restore()
         self.kept = self.run_.done
-        self.run_.progress.sessions.append(provenance() | {"from_epoch": self.kept})
+        self._begin_session()
         self._clock = time.perf_counter()
+
+    def _begin_session(self) -> None:
+        """Note what this part of the run is made with."""
+        sessions, now = self.run_.progress.sessions, provenance()
+        if sessions and sessions[-1]["engine"] != now["engine"]:
+            warnings.warn(
+                "the engine's source has changed since the last checkpoint: if it gives other results, the cell is a "
+                f"mixture; delete {self.work} to start it anew",
+                stacklevel=2,
+            )
+        sessions.append(now | {"from_epoch": self.kept})
 
     def run(self, stop: Callable[[], bool], deadline: float) -> Outcome:
         """Go on until the end, or a wish to stop."""
@@ -203,7 +214,7 @@ class _CellRun:
         metadata = store.cell_metadata(
             cell,
             run.config,
-            greedy=run.evaluation.greedy,
+            greedy=GREEDY,
             sessions=progress.sessions,
             seconds=progress.seconds,
             first_rewards=progress.first_rewards.tolist(),

@@ -1,4 +1,4 @@
-"""A training run that measures itself every tenth epoch, without noticing it.
+"""A training run that measures itself, after the first and after every tenth epoch, without noticing it.
 
 The loop is the one of `inbounds.learning.train`. What is measured is written beside the trainer's own state, so that a
 checkpoint holds the measurements of exactly the epochs that it holds.
@@ -20,7 +20,7 @@ from inbounds.study import store
 from inbounds.study.evaluate import GreedyEvaluation
 from inbounds.study.grid import Cell
 
-MEASURE_EVERY = 10  # epochs
+MEASURE_EVERY = 10  # epochs; the first is measured too: its rollout is the untrained policy's
 FIRST_STEPS = 16  # whose rewards are kept, to compare with on other machines
 
 
@@ -43,7 +43,7 @@ class Progress:
 
 
 class MeasuredTrainer:
-    """A run that measures itself every tenth epoch.
+    """A run that measures itself after the first and after every tenth epoch.
 
     Args:
         cell: whose configuration to run.
@@ -54,8 +54,10 @@ class MeasuredTrainer:
         >>> run = MeasuredTrainer(cell)
         >>> for _ in range(10):
         ...     run.epoch()
-        >>> run.progress.measurements[0]["epoch"], run.progress.measurements[0]["alpha_q50"].shape
-        (9, (2,))
+        >>> [measured["epoch"] for measured in run.progress.measurements]
+        [0, 9]
+        >>> run.progress.measurements[0]["alpha_q50"].shape
+        (2,)
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -73,7 +75,7 @@ class MeasuredTrainer:
         return len(self.trainer.records)
 
     def epoch(self) -> None:
-        """Do one epoch, and measure after every tenth."""
+        """Do one epoch, and measure after the first and every tenth."""
         with warnings.catch_warnings():
             warnings.simplefilter(
                 "ignore", DivergedSeedWarning
@@ -84,7 +86,7 @@ class MeasuredTrainer:
         assert rollout is not None
         if self.done == 1:
             self.progress.first_rewards = rollout.reward[:, :FIRST_STEPS].double().numpy().copy()
-        if self.done % MEASURE_EVERY == 0:
+        if self.done == 1 or self.done % MEASURE_EVERY == 0:
             self._measure(record, rollout)
 
     def table(self) -> pa.Table:

@@ -35,15 +35,18 @@ EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
     "seed": (pa.int32(), "the seed"),
     "env_steps": (pa.int64(), "steps of this seed's environment up to the end of the epoch"),
     "seconds": (pa.float64(), "wall time of the epoch, all seeds together, without evaluation [s]"),
-    "episodes": (pa.int32(), "episodes that ended within the epoch"),
-    "return_mean": (pa.float64(), "mean undiscounted return of those episodes; NaN where none ended"),
+    "episodes": (pa.int32(), "episodes that ended within the epoch; 0 once the seed has diverged"),
+    "return_mean": (
+        pa.float64(),
+        "mean undiscounted return of those episodes; NaN where none ended or the seed had diverged before",
+    ),
     "diverged": (pa.bool_(), "the seed's weights are not finite"),
 }
 _NOISE = "of the policy that drew the epoch's rollout, over its states and the action's dimensions"
 MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
     "greedy_return": (
         pa.float64(),
-        "return of one episode without noise: the median action, for beta the mean",
+        "undiscounted return of one episode without noise, acting by the median",
     ),
     "evaluation_seconds": (pa.float64(), "wall time of that evaluation, all seeds together [s]"),
     "entropy": (pa.float32(), "mean entropy after the update, the one of the family's bonus [nats]"),
@@ -65,9 +68,10 @@ MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
     "at_beta_max": (pa.float32(), f"fraction of β at the cap, {_NOISE}"),
 }
 COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {**EVERY_EPOCH, **MEASURED}
-"""Column → type and meaning. Those of `MEASURED` are null but for every tenth epoch; a file has those of its
-algorithm and family."""
+"""Column → type and meaning. Those of `MEASURED` are null but for the first and every tenth epoch; a file
+has those of its algorithm and family."""
 
+_WITHOUT_POLICY = {"episodes": 0, "return_mean": np.nan}
 TIMINGS = ("seconds", "evaluation_seconds")
 """The columns that no run repeats."""
 
@@ -159,13 +163,21 @@ def table_of(
     Args:
         config: of the run.
         records: of every epoch, as a `Trainer` keeps them.
-        measurements: of every tenth epoch: `epoch`, and `[S]` by the names of `MEASURED`.
+        measurements: of the first and every tenth epoch: `epoch`, and `[S]` by the names of `MEASURED`.
+
+    Returns:
+        The table. Rows of a seed that had diverged before the epoch hold no results: what its robot did while
+        nobody led it is neither a return nor a measurement of the policy.
     """
     num_seeds, rows = len(config.seeds), len(records) * len(config.seeds)
+    leaderless = np.zeros(rows, np.bool_)
+    leaderless[num_seeds:] = np.concatenate([record["diverged"] for record in records])[:-num_seeds]
     fields, arrays = [], []
     for name, (kind, meaning) in EVERY_EPOCH.items():
         values = [config.seeds if name == "seed" else record[name] for record in records]
         column = np.concatenate([np.broadcast_to(value, num_seeds) for value in values])
+        if name in _WITHOUT_POLICY:
+            column = np.where(leaderless, _WITHOUT_POLICY[name], column)
         arrays.append(pa.array(column, kind, from_pandas=False))
         fields.append(pa.field(name, kind, nullable=False, metadata={"meaning": meaning}))
     at = np.array([m["epoch"] * num_seeds + s for m in measurements for s in range(num_seeds)], np.int64)
@@ -174,6 +186,8 @@ def table_of(
         column, absent = np.full(rows, np.nan), np.ones(rows, np.bool_)
         column[at] = np.concatenate([np.broadcast_to(m[name], num_seeds) for m in measurements])
         absent[at] = False
+        if name not in TIMINGS:
+            column[leaderless] = np.nan
         arrays.append(pa.array(column.astype(kind.to_pandas_dtype()), kind, mask=absent, from_pandas=False))
         fields.append(pa.field(name, kind, metadata={"meaning": meaning}))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))

@@ -17,7 +17,6 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from inbounds.study.statistics.intervals import (
-    RESAMPLES,
     SPOKEN,
     Estimate,
     StatisticName,
@@ -27,6 +26,7 @@ from inbounds.study.statistics.intervals import (
     statistic_named,
 )
 from inbounds.study.statistics.seeds import Floats, Missing, finite_seeds
+from inbounds.study.statistics.settings import LEVEL, PROFILE_RESAMPLES, RESAMPLES
 
 
 def _strata(scores: Mapping[str, ArrayLike], missing: Missing) -> tuple[dict[str, Floats], int]:
@@ -60,7 +60,7 @@ def aggregate(
     rng: np.random.Generator,
     *,
     statistic: StatisticName = "iqm",
-    level: float = 0.95,
+    level: float = LEVEL,
     resamples: int = RESAMPLES,
     missing: Missing = "raise",
 ) -> Estimate:
@@ -109,7 +109,7 @@ def probability_of_improvement(
     second: Mapping[str, ArrayLike],
     rng: np.random.Generator,
     *,
-    level: float = 0.95,
+    level: float = LEVEL,
     resamples: int = RESAMPLES,
     missing: Missing = "raise",
 ) -> Estimate:
@@ -196,8 +196,8 @@ def performance_profile(
     thresholds: ArrayLike,
     rng: np.random.Generator,
     *,
-    level: float = 0.95,
-    resamples: int = 2000,
+    level: float = LEVEL,
+    resamples: int = PROFILE_RESAMPLES,
     missing: Missing = "raise",
 ) -> Profile:
     """Estimate the share of runs that score more than τ, for every τ: the whole distribution in one curve.

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inbounds.study.statistics.intervals import (
-    RESAMPLES,
     SPOKEN,
     Estimate,
     Method,
@@ -25,6 +24,7 @@ from inbounds.study.statistics.intervals import (
     statistic_named,
 )
 from inbounds.study.statistics.seeds import Floats, Missing, finite_seeds
+from inbounds.study.statistics.settings import LEVEL, PERMUTATIONS, RESAMPLES
 
 _TIES = 1e-9  # two permutations that are equal on paper may differ by rounding
 
@@ -54,7 +54,7 @@ def difference(
     *,
     statistic: StatisticName = "iqm",
     paired: bool = False,
-    level: float = 0.95,
+    level: float = LEVEL,
     resamples: int = RESAMPLES,
     method: Method = "expanded",
     missing: Missing = "raise",
@@ -115,7 +115,7 @@ def permutation_test(
     rng: np.random.Generator,
     *,
     paired: bool = False,
-    permutations: int = 9999,
+    permutations: int = PERMUTATIONS,
     missing: Missing = "raise",
 ) -> float:
     """Return the two-sided p-value of equal means, by permuting the studentised difference.
@@ -225,7 +225,7 @@ def compare(
     environments: Iterable[str] | None = None,
     statistic: StatisticName = "iqm",
     paired: bool = False,
-    level: float = 0.95,
+    level: float = LEVEL,
     missing: Missing = "raise",
 ) -> dict[str, Comparison]:
     """Compare two policies environment by environment: difference, p-value, p-value after Holm.

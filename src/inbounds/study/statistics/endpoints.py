@@ -1,8 +1,8 @@
 """From learning curves to one number per seed: the endpoints of the study, fixed before it ran.
 
 `curves` are mean training returns `[..., E]`, one number an epoch, any axes (environments, seeds) in front. An epoch
-without a number makes the endpoint NaN: what is missing stays visible. `carry_forward` fills the one harmless gap,
-an epoch in which no episode happened to end.
+without a number makes the endpoint NaN: what is missing stays visible. `carry_forward` fills such epochs by the rule of
+`results/PROTOCOL.md`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inbounds.study.statistics.seeds import Floats
+from inbounds.study.statistics.settings import FINAL_FRACTION
 
 
 def _curves(curves: ArrayLike) -> Floats:
@@ -23,30 +24,28 @@ def _curves(curves: ArrayLike) -> Floats:
 
 
 def area_under_curve(curves: ArrayLike) -> Floats:
-    """Return the area under learning curves by the trapezoid rule, divided by its length: a return.
+    """Return the area under learning curves divided by their length: the mean over epochs, a return.
 
-    In units of return it reads as "the average return on the way". Epochs are equally long in environment steps.
+    An epoch's number is the mean over a whole epoch, and epochs are equally long: the area is that of a bar chart, not
+    of a line through points. It reads as "the average return on the way".
 
     Args:
         curves: `[..., E]` mean return of each epoch.
 
     Returns:
-        `[...]`; NaN where any epoch is NaN (missing, or after the seed diverged).
+        `[...]`; NaN where any epoch is NaN.
 
     Raises:
         ValueError: no epochs.
 
     Example:
-        >>> area_under_curve([[0.0, 10.0, 20.0], [0.0, 20.0, 20.0]]).tolist()
-        [10.0, 15.0]
+        >>> area_under_curve([[0.0, 10.0, 20.0], [0.0, 20.0, 22.0]]).tolist()
+        [10.0, 14.0]
     """
-    array = _curves(curves)
-    if array.shape[-1] == 1:
-        return array[..., 0]
-    return np.trapezoid(array, axis=-1) / (array.shape[-1] - 1)
+    return _curves(curves).mean(-1)
 
 
-def final_score(curves: ArrayLike, fraction: float = 0.1) -> Floats:
+def final_score(curves: ArrayLike, fraction: float = FINAL_FRACTION) -> Floats:
     """Return the mean return over the last tenth of the epochs.
 
     A mean over an interval that was fixed beforehand; the best epoch would reward noise.
@@ -73,33 +72,33 @@ def final_score(curves: ArrayLike, fraction: float = 0.1) -> Floats:
     return array[..., -last:].mean(-1)
 
 
-def carry_forward(curves: ArrayLike, alive: ArrayLike) -> Floats:
-    """Fill the epochs in which no episode ended with the return of the epoch before.
+def carry_forward(curves: ArrayLike) -> Floats:
+    """Fill the epochs without a return: each with the last known return, those before the first with the first.
 
-    Only a seed that was alive in such an epoch has a gap there; a seed that diverged or stopped stays NaN, for its
-    last good return says nothing about what came after. Epochs before the first return stay NaN too.
+    Two kinds of epochs have none: those in which no episode ended, and those after a seed diverged. A diverged seed is
+    thereby charged with what it had reached: a choice, of which the protocol says that the analysis is repeated
+    without such seeds.
 
     Args:
-        curves: `[..., E]` mean return of each epoch; NaN where no episode ended.
-        alive: `[..., E]` or broadcast against it, booleans: whether the seed was still training in that epoch.
+        curves: `[..., E]` mean return of each epoch; NaN where there is none.
 
     Returns:
-        `[..., E]` a copy, filled.
+        `[..., E]` a copy, filled; NaN throughout where there is no return at all.
 
     Raises:
-        ValueError: the shapes do not fit.
+        ValueError: no epochs.
 
     Example:
         >>> nan = float("nan")
-        >>> carry_forward([[1.0, nan, 3.0], [1.0, nan, nan]], alive=[[True] * 3, [True, True, False]]).tolist()
-        [[1.0, 1.0, 3.0], [1.0, 1.0, nan]]
+        >>> carry_forward([[1.0, nan, 3.0], [nan, 2.0, nan], [nan, nan, nan]]).tolist()
+        [[1.0, 1.0, 3.0], [2.0, 2.0, 2.0], [nan, nan, nan]]
     """
-    array = _curves(curves).copy()
-    going = np.broadcast_to(np.asarray(alive, dtype=bool), array.shape)
-    for epoch in range(1, array.shape[-1]):
-        gap = np.isnan(array[..., epoch]) & going[..., epoch]
-        array[..., epoch] = np.where(gap, array[..., epoch - 1], array[..., epoch])
-    return array
+    array = _curves(curves)
+    known = ~np.isnan(array)
+    epochs = np.arange(array.shape[-1])
+    last_known = np.maximum.accumulate(np.where(known, epochs, -1), -1)
+    first_known = known.argmax(-1)[..., None]
+    return np.take_along_axis(array, np.where(last_known < 0, first_known, last_known), -1)
 
 
 def normalize_scores(scores: ArrayLike, low: ArrayLike, high: ArrayLike) -> Floats:

@@ -33,12 +33,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from inbounds.study.statistics.seeds import Floats, Missing, finite_seeds
+from inbounds.study.statistics.settings import CURVE_RESAMPLES, LEVEL, RESAMPLES
 
 StatisticName: TypeAlias = Literal["mean", "iqm"]
 Method: TypeAlias = Literal["expanded", "percentile"]
-
-RESAMPLES = 5000
-"""Bootstrap replicates: enough that the ends of an interval move by a few hundredths of its width."""
 
 _CHUNK = 4_000_000  # numbers resampled at once: 32 MB
 
@@ -176,7 +174,7 @@ def bootstrap(
     rng: np.random.Generator,
     *,
     statistic: StatisticName = "iqm",
-    level: float = 0.95,
+    level: float = LEVEL,
     resamples: int = RESAMPLES,
     method: Method = "expanded",
     missing: Missing = "raise",
@@ -222,8 +220,8 @@ def learning_curve(
     rng: np.random.Generator,
     *,
     statistic: StatisticName = "mean",
-    level: float = 0.95,
-    resamples: int = 1000,
+    level: float = LEVEL,
+    resamples: int = CURVE_RESAMPLES,
     missing: Missing = "raise",
 ) -> Estimate:
     """Estimate a learning curve over seeds, with a band that is an interval at each epoch by itself.
