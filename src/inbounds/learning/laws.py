@@ -108,7 +108,7 @@ class NormalLaw:
     def parameters(self, outputs: Array, limits: Limits, xp: ModuleType = torch) -> Parameters:
         """Return loc and the clipped log_scale, `[..., A]`, for outputs `[..., 2A]`."""
         loc, log_scale = _halves(outputs)
-        return Parameters(loc, xp.clip(log_scale, limits.log_std_min, limits.log_std_max))
+        return Parameters(loc, clip(log_scale, limits.log_std_min, limits.log_std_max))
 
     def sampler(
         self, generators: Sequence[np.random.Generator], horizon: int, act_dim: int, dtype: Any
@@ -169,7 +169,7 @@ class BetaLaw:
     def parameters(self, outputs: Array, limits: Limits, xp: ModuleType = torch) -> Parameters:
         """Return concentration1 α and concentration0 β, `[..., A]`, for outputs `[..., 2A]`."""
         softplus = torch.nn.functional.softplus(outputs) if xp is torch else np.logaddexp(outputs, 0)
-        return Parameters(*_halves(xp.clip(1 + softplus, 1.0, limits.concentration_max)))
+        return Parameters(*_halves(clip(1 + softplus, 1.0, limits.concentration_max)))
 
     def sampler(
         self, generators: Sequence[np.random.Generator], horizon: int, act_dim: int, dtype: Any
@@ -217,6 +217,11 @@ def clipped_normal(parameters: Parameters) -> ClippedNormal:
 def scaled_beta(parameters: Parameters, low: float = -1.0) -> ScaledBeta:
     """Return the Beta on [low, 1], elementwise `[..., A]`: of the unit action (low = −1) or the latent (low = 0)."""
     return ScaledBeta(parameters.first, parameters.second, low, 1.0, validate_args=False)
+
+
+def clip(x: Array, low: float, high: float) -> Array:
+    """Return x clipped to [low, high]; for NumPy in two ufuncs, which take a third of the time of `np.clip`."""
+    return x.clamp(low, high) if isinstance(x, Tensor) else np.minimum(np.maximum(x, low), high)
 
 
 def _halves(outputs: Array) -> tuple[Array, Array]:

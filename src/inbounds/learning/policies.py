@@ -147,7 +147,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
         ),
         "clipped-gaussian": Family(
             law=CLIPPED_NORMAL,
-            to_unit=lambda latent, xp: xp.clip(latent, -1.0, 1.0),
+            to_unit=lambda latent, xp: laws.clip(latent, -1.0, 1.0),
             entropy_name="entropy of the mixed law of the clipped unit action",
             entropy=lambda p: laws.clipped_normal(p).entropy().sum(-1),
             greedy={

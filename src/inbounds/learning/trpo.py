@@ -36,6 +36,9 @@ from inbounds.learning.value import fit_values
 Product = Callable[[Tensor], Tensor]
 """Maps vectors `[S, P]`, one per seed, to matrix-vector products `[S, P]`."""
 
+_CACHED = 512
+"""States in one piece of a Fisher-vector product, so that what it touches stays in the processor's cache."""
+
 
 @dataclass(frozen=True)
 class TRPOConfig:
@@ -102,12 +105,15 @@ def kl_hessian_product(networks: ActorCritic, obs: Tensor) -> Product:
         The product, for v `[S, P]` in the order of `actor.theta`.
     """
     weights = networks.actor.parameters
-    parameters = networks.parameters(obs)
-    kl = networks.policy.law.kl(parameters.detach(), parameters).mean(1)
-    gradient = flatten(torch.autograd.grad(kl.sum(), weights, create_graph=True))
+    gradients = []
+    for some in obs.split(_CACHED, 1):
+        parameters = networks.parameters(some)
+        kl = networks.policy.law.kl(parameters.detach(), parameters).sum(1) / obs.shape[1]
+        gradients.append(flatten(torch.autograd.grad(kl.sum(), weights, create_graph=True)))
 
     def product(v: Tensor) -> Tensor:
-        return flatten(torch.autograd.grad((gradient * v).sum(), weights, retain_graph=True))
+        parts = [torch.autograd.grad((g * v).sum(), weights, retain_graph=True) for g in gradients]
+        return sum(map(flatten, parts), start=torch.zeros_like(v))
 
     return product
 
