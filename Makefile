@@ -41,8 +41,9 @@ serve: book  ## preview the built book on this machine  (PORT=8000)
 	@echo "Serving on http://127.0.0.1:$(PORT)/ (Ctrl-C ends it)"
 	$(PY) -m http.server --bind 127.0.0.1 --directory _build/html $(PORT)
 
-lab: setup  ## open JupyterLab on the notebooks
-	@$(PY) -m jupyterlab --notebook-dir=notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
+lab: setup  ## open JupyterLab on the chapters without solutions, in lab/ (your changes stay)
+	@$(PY) tools/student_copies.py lab
+	@$(PY) -m jupyterlab --notebook-dir=lab $(if $(filter 0,$(shell id -u)),--allow-root)
 
 bench: setup  ## measure speed beside peers and beside the physics floor  (about 15 min, quiet machine)
 	@$(PY) -m benchmarks.run

@@ -17,12 +17,14 @@ import sys
 import time
 from pathlib import Path
 
+import student_copies
+
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "_build"
 INDEX = BUILD / "html" / "index.html"
 STAMP = BUILD / "built-from"
 CODE = ("src", "results", "constraints.txt", "pyproject.toml")
-PAGES = ("book", "notebooks", "tools/build_book.py", "_config.yml", "_toc.yml")
+PAGES = ("book", "notebooks", "tools/build_book.py", "tools/student_copies.py", "_config.yml", "_toc.yml")
 
 
 def digest(*names: str) -> str:
@@ -93,6 +95,7 @@ def main() -> int:
                 file=sys.stderr,
             )
             return status
+        student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
         STAMP.write_text(everything)
         print(f"Built in {time.perf_counter() - start:.0f} s.")
     if args.zip:

@@ -1,0 +1,161 @@
+"""Student copies have no solutions, lack nothing else, run, and never overwrite a student's work."""
+
+import ast
+import copy
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+
+def load_tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("student_copies", ROOT / "tools/student_copies.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+tool = load_tool()
+
+
+def tagged(cell: nbformat.NotebookNode) -> bool:
+    return "solution" in cell.metadata.get("tags", [])
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_a_chapters_copy_has_no_solution_and_lacks_nothing_else(path: Path) -> None:
+    chapter = nbformat.read(path, as_version=4)
+    before = copy.deepcopy(chapter)
+    student = tool.student_copy(chapter)
+    assert chapter == before
+    nbformat.validate(student)
+
+    prose = "\n".join(cell.source for cell in student.cells if cell.cell_type == "markdown")
+    assert "solution-start" not in prose
+    assert "solution-end" not in prose
+    whole = "\n".join(cell.source for cell in chapter.cells if cell.cell_type == "markdown")
+    assert whole.count("```{solution-start}") == prose.count(tool.INSTEAD) > 0
+    for part in ("{exercise-start}", "{exercise-end}", "\n## ", "{admonition}"):
+        assert prose.count(part) == whole.count(part)
+
+    kept = [cell for cell in chapter.cells if cell.cell_type == "code" and not tagged(cell)]
+    code = [cell for cell in student.cells if cell.cell_type == "code"]
+    assert [cell.source for cell in code] == [cell.source for cell in kept]
+    assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
+
+
+def defined(tree: ast.AST) -> set[str]:
+    """Names that a cell binds, at whatever depth: generous, because only names bound nowhere else count."""
+    names = {
+        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    names |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    names |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    return names | {alias.asname or alias.name.split(".")[0] for node in imports for alias in node.names}
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_what_is_left_needs_nothing_from_a_solution(path: Path) -> None:
+    """Otherwise *Run All* on a student copy would end in a NameError."""
+    cells = [c for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
+    kept = [ast.parse(cell.source) for cell in cells if not tagged(cell)]
+    only_in_solutions = set().union(*(defined(ast.parse(c.source)) for c in cells if tagged(c)))
+    only_in_solutions -= set().union(*map(defined, kept))
+    used = {node.id for tree in kept for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert used & only_in_solutions == set()
+
+
+def exercise() -> nbformat.NotebookNode:
+    """A chapter of one exercise; its markers share their cells with other text, as they do in the book."""
+    solution = new_code_cell("def mass_outside(*arguments):\n    return 0.5", metadata={"tags": ["solution"]})
+    grader = "from inbounds.book import graders\ngraders.mass_outside(mass_outside)"
+    return new_notebook(
+        cells=[
+            new_markdown_cell(
+                "# A chapter\n\n```{exercise-start} Mass\n:label: ex\n```\n\nWrite it.\n\n```{exercise-end}\n```"
+            ),
+            new_code_cell("def mass_outside(loc, scale, low, high):\n    return ..."),
+            new_markdown_cell("Before.\n\n```{solution-start} ex\n:class: dropdown\n```\n\nA secret."),
+            solution,
+            new_markdown_cell("Another secret.\n\n```{solution-end}\n```\n\nAfter."),
+            new_code_cell(grader, execution_count=3),
+        ]
+    )
+
+
+def last_output(notebook: nbformat.NotebookNode) -> str:
+    NotebookClient(notebook, timeout=120).execute()
+    return notebook.cells[-1].outputs[0].data["text/plain"]
+
+
+def test_run_all_grades_the_students_own_code() -> None:
+    student = tool.student_copy(exercise())
+    text = "\n".join(cell.source for cell in student.cells)
+    assert "secret" not in text
+    assert "Before." in text
+    assert "After." in text
+    assert last_output(copy.deepcopy(student)).startswith("… not answered")
+    student.cells[1].source = "def mass_outside(loc, scale, low, high):\n    return 2.0"
+    assert last_output(student).startswith("✗ not yet: mass_outside")
+
+
+def test_slips_of_an_author_are_refused() -> None:
+    untagged, misplaced, endless, headless = (exercise() for _ in range(4))
+    untagged.cells[3].metadata = {}
+    misplaced.cells[1].metadata = {"tags": ["solution"]}
+    del endless.cells[4:]
+    del headless.cells[2:4]
+    slips = {"tag": (untagged, misplaced), "does not end": (endless,), "without its": (headless,)}
+    for complaint, notebooks in slips.items():
+        for notebook in notebooks:
+            with pytest.raises(ValueError, match=complaint):
+                tool.student_copy(notebook)
+
+
+def test_handing_out_never_takes_a_students_work(tmp_path: Path) -> None:
+    chapters, folder = tmp_path / "notebooks", tmp_path / "lab"
+    chapters.mkdir()
+    chapter, theirs = chapters / "01_a.ipynb", folder / "01_a.ipynb"
+    notebook = exercise()
+    nbformat.write(notebook, chapter)
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "new"}
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "unchanged"}
+
+    notebook.cells[0].source += "\nA better sentence."
+    nbformat.write(notebook, chapter)
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "updated"}
+    assert "A better sentence." in theirs.read_text()
+
+    work = theirs.read_text().replace("return ...", "return 1")
+    theirs.write_text(work)
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "kept"}
+    notebook.cells[0].source += "\nA still better sentence."
+    nbformat.write(notebook, chapter)
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "outdated"}
+    assert theirs.read_text() == work
+
+    theirs.rename(folder / "mine.ipynb")
+    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "new"}
+    assert "A still better sentence." in theirs.read_text()
+
+
+def test_downloads_are_student_copies(tmp_path: Path) -> None:
+    chapters, downloads = tmp_path / "notebooks", tmp_path / "html" / "_sources" / "notebooks"
+    chapters.mkdir()
+    downloads.mkdir(parents=True)
+    for name in ("01_a.ipynb", "02_not_in_the_book.ipynb"):
+        nbformat.write(exercise(), chapters / name)
+    nbformat.write(exercise(), downloads / "01_a.ipynb")
+    for _ in range(2):  # a page that was not built anew has its copy already
+        tool.write_downloads(chapters, tmp_path / "html")
+        assert [path.name for path in downloads.iterdir()] == ["01_a.ipynb"]
+        assert "secret" not in json.dumps(json.loads((downloads / "01_a.ipynb").read_text()))

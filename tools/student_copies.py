@@ -1,0 +1,155 @@
+"""Student copies: the chapters without their solutions, so that *Run All* grades the student's own code.
+
+    python tools/student_copies.py [FOLDER]    hand the chapters out into FOLDER (lab/), as `make lab` does
+
+An exercise is a stub, a solution and a grader's cell. In the book the solution comes after the stub and takes its
+place; here it is left out, prose and cells alike, from ``{solution-start}`` to ``{solution-end}``. The book's download
+button hands out the same copies (``tools/build_book.py``).
+
+A copy that a student has changed is never overwritten.
+"""
+
+import argparse
+import copy
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+import nbformat
+
+ROOT = Path(__file__).resolve().parents[1]
+LEDGER = ".handed-out.json"
+"""In the students' folder: the digest of each notebook as it was handed out."""
+INSTEAD = "*The solution is in the book.*"
+
+
+def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """The notebook without its solutions, and without outputs, which are the book's and not the student's.
+
+    Args:
+        notebook: a chapter, unchanged by this.
+
+    Raises:
+        ValueError: a solution's code cell lacks the tag ``solution``, another has it, or the markers do not pair.
+    """
+    student = copy.deepcopy(notebook)
+    student.cells, inside = [], False
+    for number, cell in enumerate(notebook.cells):
+        kept = copy.deepcopy(cell)
+        if cell.cell_type == "code":
+            if inside != ("solution" in cell.metadata.get("tags", [])):
+                raise ValueError(
+                    f"cell {number}: the cells of a solution, and only they, carry the tag `solution`: "
+                    f"{cell.source[:60]!r}"
+                )
+            kept.update(outputs=[], execution_count=None)
+        else:
+            kept.source, inside = without_solutions(cell.source, inside)
+        if kept.source.strip() and not (inside and cell.cell_type == "code"):
+            student.cells.append(kept)
+    if inside:
+        raise ValueError("a solution does not end: {solution-end} is missing")
+    return student
+
+
+def without_solutions(text: str, inside: bool) -> tuple[str, bool]:
+    """Cut solutions out of Markdown; one may begin and end in different cells.
+
+    Args:
+        text: of one cell.
+        inside: whether the cell begins within a solution.
+
+    Returns:
+        What is left of the text, and whether it ends within a solution.
+    """
+    left, closing = [], False
+    for line in text.splitlines():
+        if line.startswith("```{solution-start}"):
+            inside = True
+            left.append(INSTEAD)
+        elif line.startswith("```{solution-end}"):
+            if not inside:
+                raise ValueError("{solution-end} without its {solution-start}")
+            closing = True
+        elif closing and line.startswith("```"):
+            inside = closing = False
+        elif not inside:
+            left.append(line)
+    return "\n".join(left).strip("\n"), inside
+
+
+def written(path: Path) -> str:
+    """The student copy of a chapter, as the text of a notebook file."""
+    notebook = nbformat.read(path, as_version=4)
+    try:
+        return nbformat.writes(student_copy(notebook)) + "\n"
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from error
+
+
+def hand_out(chapters: Path, folder: Path) -> dict[str, str]:
+    """Put a copy of every chapter into a student's folder, except over what the student has changed.
+
+    Args:
+        chapters: folder of the book's notebooks.
+        folder: the student's; made if it is not there.
+
+    Returns:
+        By name: ``new``, ``unchanged``, ``updated``, ``kept`` (the student changed it), or ``outdated`` (the student
+        changed it, and the book has a newer version).
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    ledger_file = folder / LEDGER
+    ledger = json.loads(ledger_file.read_text(encoding="utf8")) if ledger_file.exists() else {}
+    outcome = {}
+    for chapter in sorted(chapters.glob("[0-9]*.ipynb")):
+        ours, theirs = written(chapter), folder / chapter.name
+        before = digest(theirs.read_text(encoding="utf8")) if theirs.exists() else None
+        if before is not None and before != ledger.get(chapter.name):
+            outcome[chapter.name] = "kept" if digest(ours) == ledger.get(chapter.name) else "outdated"
+            continue
+        outcome[chapter.name] = (
+            "new" if before is None else "unchanged" if before == digest(ours) else "updated"
+        )
+        if before != digest(ours):
+            theirs.write_text(ours, encoding="utf8")
+        ledger[chapter.name] = digest(ours)
+    ledger_file.write_text(json.dumps(ledger, indent=1) + "\n", encoding="utf8")
+    return outcome
+
+
+def write_downloads(chapters: Path, html: Path) -> None:
+    """Let the download buttons of a built book hand out student copies.
+
+    Args:
+        chapters: folder of the book's notebooks.
+        html: the built book, where ``_sources/notebooks/`` holds what the buttons link to.
+    """
+    for download in sorted((html / "_sources" / chapters.name).glob("*.ipynb")):
+        download.write_text(written(chapters / download.name), encoding="utf8")
+
+
+def digest(text: str) -> str:
+    """A digest of a notebook's text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "lab")
+    folder = parser.parse_args().folder
+    for name, state in hand_out(ROOT / "notebooks", folder).items():
+        note = {
+            "kept": " (you changed it)",
+            "outdated": " (you changed it; rename yours to get the book's newer version)",
+        }
+        print(f"{state:>9}  {name}{note.get(state, '')}")
+    print(f"Chapters without solutions: {folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
