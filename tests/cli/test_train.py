@@ -15,7 +15,7 @@ from rich.console import Console
 from inbounds.cli import main
 from inbounds.cli.progress import TrainingProgress
 from inbounds.learning import Trainer, checkpoint
-from inbounds.learning.run_files import is_disk_full
+from inbounds.learning.files import is_disk_full
 from inbounds.learning.run_store import load_checkpoint, load_policies, read_curves
 from tests.cli.small import contents, run, same_rows, small, succeeds
 

@@ -11,7 +11,7 @@ from scipy import stats
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Trainer, preset
-from inbounds.learning.run_files import DamagedFileError, write_whole
+from inbounds.learning.files import DamagedFileError, write_whole
 from inbounds.learning.run_store import (
     COLUMNS,
     config_of,

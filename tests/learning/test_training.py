@@ -6,12 +6,14 @@ import sys
 import textwrap
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, checkpoint, preset, train
+from inbounds.learning.files import DamagedFileError
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 
@@ -154,20 +156,47 @@ def test_a_run_killed_in_mid_epoch_goes_on_as_if_nothing_had_happened(tmp_path: 
     assert same_records(whole.records, resumed.records)
 
 
+def some_state(epoch: int) -> dict[str, Any]:
+    return {"config": {}, "networks": np.arange(3.0), "records": [epoch]}
+
+
 def test_a_checkpoint_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / checkpoint.FILE_NAME
-    checkpoint.save(path, {"epoch": 1, "array": np.arange(3.0)})
+    checkpoint.save(path, some_state(1))
 
-    def dies(state: object, file: object) -> None:
-        file.write(b"half a checkpo")
+    def dies(file: int) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(torch, "save", dies)
+    monkeypatch.setattr(os, "fsync", dies)
     with pytest.raises(OSError, match="disk full"):
-        checkpoint.save(path, {"epoch": 2, "array": np.arange(3.0)})
+        checkpoint.save(path, some_state(2))
     state = checkpoint.load(path)
-    assert state["epoch"] == 1
-    assert np.array_equal(state["array"], np.arange(3.0))
+    assert state["records"] == [1]
+    assert np.array_equal(state["networks"], np.arange(3.0))
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("damage", ["cut", "flipped", "other"])
+def test_a_damaged_checkpoint_says_what_to_do(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / checkpoint.FILE_NAME
+    train(small_config(epochs=1), run_dir=tmp_path, make_envs=PointEnv)
+    whole = path.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 1
+    path.write_bytes({"cut": whole[:-100], "flipped": bytes(flipped), "other": b"no checkpoint"}[damage])
+    with pytest.raises(DamagedFileError, match=r"checkpoint.pt is damaged.*move .* out of the way"):
+        train(small_config(epochs=2), run_dir=tmp_path, make_envs=PointEnv)
+
+
+def test_a_run_whose_seeds_all_diverge_keeps_its_end(tmp_path: Path) -> None:
+    def poison(trainer: Trainer, _: object) -> None:
+        trainer.networks.actor.theta.fill_(torch.nan)
+
+    config = small_config(epochs=20)
+    with pytest.warns(DivergedSeedWarning):
+        run = train(config, run_dir=tmp_path, make_envs=PointEnv, callback=poison)
+    assert run.finished
+    assert len(checkpoint.load(tmp_path / checkpoint.FILE_NAME)["records"]) == len(run.records) == 2
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:

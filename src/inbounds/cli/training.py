@@ -18,8 +18,8 @@ from inbounds.cli.options import Train
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
 from inbounds.learning import TrainConfig, Trainer, checkpoint, train
+from inbounds.learning.files import DamagedFileError, is_disk_full
 from inbounds.learning.rollout import check_environments
-from inbounds.learning.run_files import DamagedFileError, is_disk_full
 from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
 from inbounds.learning.training import Record, describe, make_environments
 from inbounds.robots.registration import TASK_NAMES

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inbounds.book.videos import write_film
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Watch
-from inbounds.learning.run_files import DamagedFileError, is_disk_full
+from inbounds.learning.files import DamagedFileError, is_disk_full
 from inbounds.learning.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.trained_policy import TrainedPolicy
 from inbounds.learning.training import make_environments

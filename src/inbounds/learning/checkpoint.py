@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import os
+import io
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+
+from inbounds.learning.files import damaged, write_whole
 
 FILE_NAME = "checkpoint.pt"
 
@@ -18,13 +21,13 @@ def save(path: Path, state: dict[str, Any]) -> None:
     Args:
         path: of the file; its folder must exist.
         state: nested dictionaries, lists, tuples, numbers, strings, tensors and NumPy arrays.
+
+    Raises:
+        OSError: it could not be written, as on a full disk; the old file is untouched.
     """
-    temporary = path.with_suffix(".partial")
-    with open(temporary, "wb") as file:
-        torch.save(_to_tensors(state), file)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    buffer = io.BytesIO()
+    torch.save(_to_tensors(state), buffer)
+    write_whole(path, buffer.getbuffer())
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -35,8 +38,25 @@ def load(path: Path) -> dict[str, Any]:
 
     Returns:
         The state, arrays as arrays.
+
+    Raises:
+        DamagedFileError: the file is cut short, damaged, or no checkpoint.
     """
-    return _to_arrays(torch.load(path, weights_only=True))
+    remedy = (
+        f"move {path.parent} out of the way and train again, or put a copy of the checkpoint in its place. "
+        "Nothing has been changed"
+    )
+    try:
+        with zipfile.ZipFile(path) as parts:  # torch writes checksums and does not look at them
+            bad = parts.testzip()
+        state = _to_arrays(torch.load(path, weights_only=True))
+    except Exception as error:  # torch raises whatever the damage makes it stumble over
+        raise damaged(path, error, remedy) from error
+    if bad is not None:
+        raise damaged(path, f"the checksum of {bad} is wrong", remedy)
+    if not isinstance(state, dict) or not {"config", "networks", "records"} <= state.keys():
+        raise damaged(path, "it holds no run", remedy)
+    return state
 
 
 def _to_tensors(tree: Any) -> Any:

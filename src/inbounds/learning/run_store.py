@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,14 +23,8 @@ from numpy.typing import NDArray
 
 from inbounds.learning import checkpoint
 from inbounds.learning.config import TrainConfig
-from inbounds.learning.run_files import (
-    METADATA_KEY,
-    config_from,
-    damaged,
-    find,
-    metadata_of,
-    write_whole,
-)
+from inbounds.learning.files import damaged, find, write_whole
+from inbounds.learning.run_files import METADATA_KEY, config_from, metadata_of
 from inbounds.learning.trained_policy import TrainedPolicy
 from inbounds.learning.training import Record, Trainer
 
@@ -271,19 +264,4 @@ def load_checkpoint(run_dir: str | Path) -> dict[str, Any]:
         FileNotFoundError: there is none.
         DamagedFileError: it is damaged.
     """
-    path = find(run_dir, CHECKPOINT_FILE)
-    remedy = (
-        f"move {path.parent} out of the way and train again, or put a copy of the checkpoint in its place. "
-        "Nothing has been changed"
-    )
-    try:
-        with zipfile.ZipFile(path) as parts:  # torch writes checksums and does not look at them
-            bad = parts.testzip()
-        state = checkpoint.load(path)
-    except Exception as error:  # torch raises whatever the damage makes it stumble over
-        raise damaged(path, error, remedy) from error
-    if bad is not None:
-        raise damaged(path, f"the checksum of {bad} is wrong", remedy)
-    if not isinstance(state, dict) or not {"config", "networks", "records"} <= state.keys():
-        raise damaged(path, "it holds no run", remedy)
-    return state
+    return checkpoint.load(find(run_dir, CHECKPOINT_FILE))

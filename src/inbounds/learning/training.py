@@ -120,6 +120,11 @@ class Trainer:
         self.diverged |= now
 
     @property
+    def finished(self) -> bool:
+        """Whether all epochs are done, or no seed is left to learn in them."""
+        return len(self.records) >= self.config.epochs or bool(self.diverged.all())
+
+    @property
     def policies(self) -> list[TrainedPolicy]:
         """What has been learned so far, one policy per seed, ready to act without the trainer."""
         from inbounds.learning.run_store import policies_of  # imports this module
@@ -145,7 +150,7 @@ class Trainer:
             ValueError: another configuration wrote it; more epochs than planned then are allowed.
         """
         ours, theirs = describe(self.config), state["config"]
-        different = [key for key in ours if ours[key] != theirs.get(key) and key not in _FREE_TO_CHANGE]
+        different = [key for key in ours if ours[key] != theirs.get(key) and key not in FREE_TO_CHANGE]
         if different:
             changes = "; ".join(f"{key}: {theirs.get(key)} → {ours[key]}" for key in different)
             raise ValueError(
@@ -160,7 +165,8 @@ class Trainer:
         self.diverged = state["diverged"].copy()
 
 
-_FREE_TO_CHANGE = ("epochs", "checkpoint_every")
+FREE_TO_CHANGE = ("epochs", "checkpoint_every")
+"""What a run may be continued with that it was not begun with."""
 
 
 def train(
@@ -186,7 +192,9 @@ def train(
         The trainer, its run finished, with `records`, `networks`, `diverged`, `collector`.
 
     Raises:
-        ValueError: the run directory belongs to another configuration.
+        ValueError: the run directory belongs to another configuration, or its checkpoint is damaged
+            (`DamagedFileError`).
+        OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
     """
     trainer = Trainer(config, make_envs)
     path = None
@@ -195,10 +203,9 @@ def train(
         path = Path(run_dir) / checkpoint.FILE_NAME
         if path.exists():
             trainer.load_state_dict(checkpoint.load(path))
-    while len(trainer.records) < config.epochs and not trainer.diverged.all():
+    while not trainer.finished:
         record = trainer.epoch()
-        done = len(trainer.records)
-        if path is not None and (done % config.checkpoint_every == 0 or done == config.epochs):
+        if path is not None and (len(trainer.records) % config.checkpoint_every == 0 or trainer.finished):
             checkpoint.save(path, trainer.state_dict())
         if callback is not None:
             callback(trainer, record)

@@ -1,0 +1,84 @@
+"""Files that are whole or absent, and errors that say what became of the others."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+
+class DamagedFileError(ValueError):
+    """A file of a run is cut short, damaged, or of another origin; the message names file and remedy."""
+
+
+def is_disk_full(error: BaseException | None) -> bool:
+    """Tell whether an error, or what led to it, is a disk (or a quota) without room.
+
+    torch reports a write that failed half-way as a RuntimeError of its own, which has the cause as its context.
+
+    Example:
+        >>> is_disk_full(OSError(errno.ENOSPC, "No space left on device")), is_disk_full(OSError(errno.EACCES, "no"))
+        (True, False)
+    """
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def find(run: str | Path, name: str) -> Path:
+    """Return the path of a file of a run.
+
+    Args:
+        run: run directory, or the file itself.
+        name: of the file, if it is a directory.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    path = Path(run)
+    if path.is_dir():
+        path /= name
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {path.parent})")
+    return path
+
+
+def damaged(path: Path, reason: object, remedy: str = "") -> DamagedFileError:
+    """Return the error that says what is wrong with a file and what to do.
+
+    Args:
+        path: of the file.
+        reason: why it cannot be read, an exception or words; its first line is quoted.
+        remedy: what to do; by default, to have the file written anew from the checkpoint.
+    """
+    remedy = remedy or (
+        "repeat the `inbounds train` command of this run, which writes it anew from the checkpoint beside it, "
+        "or put a copy in its place"
+    )
+    said = (str(reason) or type(reason).__name__).splitlines()[0].rstrip(".")
+    return DamagedFileError(f"{path} is damaged, cut short or of another origin ({said[:120]}): {remedy}")
+
+
+def write_whole(path: Path, data: Any) -> None:
+    """Write a file that is, whenever the process or the machine dies, the old one or the new one.
+
+    Args:
+        path: of the file; its folder must exist.
+        data: bytes, or a buffer.
+
+    Raises:
+        OSError: it could not be written, as on a full disk; the old file is untouched.
+    """
+    temporary = path.with_name(f".{path.name}.partial")
+    try:
+        with open(temporary, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)  # on a full disk every byte counts
+        raise
