@@ -18,7 +18,7 @@ import pyarrow as pa
 import safetensors
 
 from inbounds.learning import checkpoint
-from inbounds.learning.run_files import DamagedFileError, is_disk_full
+from inbounds.learning.files import DamagedFileError, is_disk_full
 from inbounds.learning.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.claim import Claim
@@ -155,11 +155,7 @@ class _CellRun:
         (self.work / PREVIOUS).mkdir(exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
             os.replace(path, self.work / PREVIOUS / checkpoint.FILE_NAME)
-        try:
-            checkpoint.save(path, self.run_.state_dict())
-        except BaseException:
-            path.with_suffix(".partial").unlink(missing_ok=True)  # on a full disk every byte counts
-            raise
+        checkpoint.save(path, self.run_.state_dict())
         self.kept = self.run_.done
 
     def _restore(self) -> None:
@@ -207,7 +203,7 @@ class _CellRun:
             run.progress.seconds["final evaluation"] = time.perf_counter() - start
             contents[policies] = temporary.read_bytes()
             contents[returns] = store.parquet_bytes(
-                pa.Table.from_pylist(rows, _RETURNS), store.cell_metadata(cell, run.config)
+                pa.Table.from_pylist(rows, RETURNS), store.cell_metadata(cell, run.config)
             )
         self._tick()
         progress = run.progress
@@ -228,7 +224,7 @@ class _CellRun:
             temporary.unlink()
 
 
-_RETURNS = pa.schema(
+RETURNS = pa.schema(
     [
         pa.field("seed", pa.int32(), nullable=False),
         pa.field("greedy", pa.string(), nullable=False),

@@ -23,7 +23,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
-from inbounds.learning.run_files import METADATA_KEY, DamagedFileError, metadata_of, write_whole
+from inbounds.learning.files import DamagedFileError, write_whole
+from inbounds.learning.run_files import METADATA_KEY, metadata_of
 from inbounds.study.claim import file_lock
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 

@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
-from inbounds.learning.run_files import DamagedFileError
+from inbounds.learning.files import DamagedFileError
 from inbounds.learning.training import describe
 from inbounds.study import store
 from inbounds.study.grid import STUDY_VERSION, Cell
