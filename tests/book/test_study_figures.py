@@ -1,5 +1,6 @@
 """The study's figures: they show the numbers given, say what the band is, and hide nothing that is missing."""
 
+import dataclasses
 from collections.abc import Iterator
 
 import matplotlib as mpl
@@ -67,7 +68,11 @@ def test_every_panel_draws_the_curves_and_bands_it_was_given() -> None:
         "Line: mean. Band: 95 % bootstrap interval, at each epoch by itself. n = 10 seeds."
         in said.replace("95%", "95 %")
     )
-    for text in ["return", "environment steps [millions]", *(look.label for look in FAMILIES.values())]:
+    for text in [
+        "return",
+        "env steps per seed [millions]",
+        *(look.label for look in FAMILIES.values()),
+    ]:
         assert text in said
 
 
@@ -80,6 +85,16 @@ def test_a_missing_cell_and_a_diverged_seed_are_in_the_panel_and_in_the_legend()
     said = words(fig)
     assert "n = 10 seeds unless noted" in said
     assert said.count("Logit-normal") == 2
+
+
+def test_seeds_that_count_although_they_diverged_are_named() -> None:
+    marked = dataclasses.replace(curve(0).estimate, diverged=3)
+    fig = study_figures.learning_curves({"Hopper-v5": {"beta": Curve(STEPS, marked), "gaussian": curve(0)}})
+    assert fig.axes[0].texts[0].get_text() == "Beta: n = 10, 3 diverged"
+    one = dataclasses.replace(estimate(scores(0)), diverged=1)
+    assert [t.get_text() for t in study_figures.interval_panels({"a": {"beta": one}}).axes[0].texts] == [
+        "n = 10, 1 diverged"
+    ]
 
 
 def test_interval_panels_show_value_and_interval_in_the_familys_look() -> None:
@@ -104,12 +119,12 @@ def test_a_row_keeps_its_place_where_its_cell_is_missing_and_is_hollow_where_a_s
     lost = np.where(np.arange(10) == 3, np.nan, scores(0))
     cells = {
         "Hopper-v5": {"gaussian": estimate(lost, missing="exclude"), "beta": None},
-        "Ant-v5": {"beta": estimate(scores(1))},
+        "Ant-v5": {"beta": estimate(scores(1))},  # and no Gaussian was planned
     }
     hopper, ant = study_figures.interval_panels(cells).axes
     assert [t.get_text() for t in hopper.texts] == ["n = 9, 1 left out", "missing"]
     assert hopper.lines[1].get_markerfacecolor() == "white"
-    assert [(t.get_text(), t.get_position()[1]) for t in ant.texts] == [("missing", 0)]
+    assert [(t.get_text(), t.get_position()[1]) for t in ant.texts] == [("not planned", 0)]
     assert ant.lines[1].get_ydata()[0] == 1
 
 

@@ -13,10 +13,10 @@ import pyarrow as pa
 import pytest
 from rich.console import Console
 
+from inbounds.cli.studying import study
 from inbounds.learning import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
 from inbounds.study.claim import Claim, read_claim
-from inbounds.study.command import study
 from inbounds.study.progress import StudyProgress, cell_status, status_table
 from inbounds.study.run import commit_cell
 from inbounds.study.store import read_metadata

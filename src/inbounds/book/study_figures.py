@@ -1,8 +1,8 @@
 """How the study is drawn: learning curves, intervals, differences, performance profiles.
 
-Every figure says what its band or bar is and how many seeds it rests on; a seed that was left out is counted beside
-its curve, and a cell that was not run, or not finished, keeps its place and is called missing. Data come in as the
-results of `inbounds.study.statistics`; nothing here reads a file or computes a statistic::
+Every figure says what its band or bar is and how many seeds it rests on; a seed that diverged or was left out is
+counted beside its curve, and a cell that was not run, or not finished, keeps its place and is called missing. Data come
+in as the results of `inbounds.study.statistics`; nothing here reads a file or computes a statistic::
 
     curves = {"Hopper-v5": {"beta": Curve(steps, learning_curve(returns, rng)), "logit-normal": None}}
     figures.show(learning_curves(curves), alt="Return against environment steps: ...")
@@ -36,7 +36,9 @@ from inbounds.study.statistics import Comparison, Estimate, Profile
 __all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "performance_profiles"]
 
 _QUIET = "#5F6770"
-_SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "logit-normal": "Logit-normal"}
+_NOT_PLANNED = "not planned"
+SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "logit-normal": "Logit-normal"}
+"""Names where there is little room."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
             ax.xaxis.set_major_locator(MaxNLocator(5))
         fig.supylabel(ylabel, fontsize=13)
         for ax in lowest(axes):
-            ax.set_xlabel("environment steps [millions]")
+            ax.set_xlabel("env steps per seed [millions]")
         family_legend(fig, families)
         drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
         note(fig, "Line", "Band", drawn, ", at each epoch by itself")
@@ -115,7 +117,8 @@ def interval_panels(
     """Point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
 
     Args:
-        panels: per panel and family its estimate, or None where the cell is missing.
+        panels: per panel and family its estimate, or None where the cell is missing; a family that one panel names
+            and another does not keeps its row there, as not planned.
         xlabel: what is estimated, with its unit.
         reference: where to draw a vertical line, such as 0 for differences.
 
@@ -134,7 +137,10 @@ def interval_panels(
     """
     families = families_in(panels.values())
     rows = {family: (FAMILIES[family].label, family) for family in families}
-    cells = {title: {f: (rows_of.get(f), "") for f in families} for title, rows_of in panels.items()}
+    cells = {
+        title: {f: (given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
+        for title, given in panels.items()
+    }
     return _bars(cells, rows, xlabel, reference)
 
 
@@ -166,7 +172,7 @@ def difference_panels(
     pairs = list(dict.fromkeys(pair for cells in panels.values() for pair in cells))
     for family in {family for pair in pairs for family in pair}:
         family_style(family)
-    rows = {pair: (f"{_SHORT[pair[0]]}\n− {_SHORT[pair[1]]}", pair[0]) for pair in pairs}
+    rows = {pair: (f"{SHORT[pair[0]]}\n− {SHORT[pair[1]]}", pair[0]) for pair in pairs}
     cells = {
         title: {
             pair: (row.difference, _p_value(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
@@ -219,7 +225,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     """Draw one row: marker, interval, and in words what is not as it should be."""
     if estimate is None:
         ax.text(
-            0.5, place, "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
+            0.5, place, remark or "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
             style="italic", color=_QUIET, fontsize=SMALL,
         )  # fmt: skip
         return

@@ -49,8 +49,12 @@ def lowest(axes: list[Any]) -> list[Any]:
 
 
 def left_out(estimate: Estimate) -> str:
-    """Say how many seeds count and how many do not, or nothing where all do."""
-    return f"n = {estimate.n}, {estimate.missing} left out" if estimate.missing else ""
+    """Say how many seeds count, how many of them diverged and how many do not count; nothing where all is well."""
+    remarks = [
+        f"{estimate.diverged} diverged" if estimate.diverged else "",
+        f"{estimate.missing} left out" if estimate.missing else "",
+    ]
+    return ", ".join(filter(None, [f"n = {estimate.n}", *remarks])) if any(remarks) else ""
 
 
 def list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = True) -> None:
@@ -58,7 +62,7 @@ def list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = 
     lines = [
         f"{FAMILIES[family].label}: {left_out(estimate) if estimate else 'missing'}"
         for family, estimate in cells.items()
-        if estimate is None or estimate.missing
+        if estimate is None or left_out(estimate)
     ]
     if lines:
         ax.text(
@@ -93,5 +97,5 @@ def note(fig: Figure, mark: str, band: str, drawn: list[Estimate], where: str, r
         text = f"{mark}: {statistic}. {band}: {level:.0%} bootstrap interval{where}.{count} {remark}"
     # A legend of nothing but its title: the layout engine keeps room for it below the panels.
     fig.legend(
-        handles=[], title=textwrap.fill(text.strip(), 88), title_fontsize=SMALL, loc="outside lower left"
+        handles=[], title=textwrap.fill(text.strip(), 80), title_fontsize=SMALL, loc="outside lower left"
     )

@@ -1,4 +1,4 @@
-"""The command `inbounds`: train, watch, bench.
+"""The command `inbounds`: train, watch, bench, study.
 
 >>> main(["watch", "no/such/run"])  # what to do instead goes to standard error
 1
@@ -28,7 +28,9 @@ EXAMPLES = {
     "study": """\
   inbounds study status
   inbounds study run standard --nice 19 --max-minutes 60
-  inbounds study verify""",
+  inbounds study run --scheduler tcp://host:8786      (on a Dask cluster; see `inbounds.study.cluster`)
+  inbounds study report --out study-report.html
+  inbounds study verify --random 2 --epochs 20""",
 }
 
 
@@ -62,7 +64,7 @@ def _run(args: list[str]) -> int:
         if args[:1] == ["bench"] and benchmark.find_root():
             return benchmark.run(args[1:])  # its options are its own
         if args[:1] == ["study"]:
-            from inbounds.study.command import study
+            from inbounds.cli.studying import study
 
             return study(args[1:])
         command = options.parse(args)

@@ -235,7 +235,7 @@ def compare(
     Args:
         first: per environment the scores `[S]`.
         second: the same for the other policy.
-        rng: source of resamples and permutations.
+        rng: source of resamples and permutations; each environment has a child of it.
         environments: the planned ones, in order; by default those of either policy.
         statistic: whose difference is estimated; the test is always about means.
         paired: whether the design pairs the seeds.
@@ -259,13 +259,14 @@ def compare(
     """
     planned = list(environments) if environments is not None else list(dict.fromkeys([*first, *second]))
     rows: list[tuple[Estimate | None, float]] = []
-    for name in planned:
+    # A generator each: what comes out for one environment does not depend on which others are there.
+    for name, own in zip(planned, rng.spawn(len(planned)), strict=True):
         if name not in first or name not in second:
             rows.append((None, float("nan")))
             continue
         a, b = first[name], second[name]
-        estimate = difference(a, b, rng, statistic=statistic, paired=paired, level=level, missing=missing)
-        rows.append((estimate, permutation_test(a, b, rng, paired=paired, missing=missing)))
+        estimate = difference(a, b, own, statistic=statistic, paired=paired, level=level, missing=missing)
+        rows.append((estimate, permutation_test(a, b, own, paired=paired, missing=missing)))
     adjusted = holm([p for _, p in rows])
     return {
         name: Comparison(estimate, p, float(corrected))

@@ -59,6 +59,8 @@ class Estimate:
     """Nominal coverage."""
     statistic: str
     """What is estimated, as a figure says it: "mean", "IQM", "difference of means" …"""
+    diverged: int = 0
+    """Seeds that count although they diverged; whoever decided that they do says so here."""
 
 
 def interquartile_mean(values: ArrayLike, weights: ArrayLike | None = None, axis: int = -1) -> Floats:

@@ -1,4 +1,4 @@
-"""`inbounds study run | resume | status | verify`: what the words of the command line do."""
+"""`inbounds study run | resume | status | report | verify`: what the words of the command line do."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tyro.conf import Positional, arg, subcommand
 
 from inbounds.study.cell_run import StudyError
 from inbounds.study.grid import Cell, select
+from inbounds.study.outcomes import Outcomes
 from inbounds.study.progress import StudyProgress, cell_status, status_table
 from inbounds.study.run import Settings, run_study
 from inbounds.study.store import StudyFolder
@@ -65,6 +66,14 @@ class Status(_Where):
 
 
 @dataclass(frozen=True)
+class Report(_Where):
+    """Write an HTML page of figures and tables of all finished cells; what is missing is called missing."""
+
+    out: Path = Path("study-report.html")
+    """The file; it needs no other."""
+
+
+@dataclass(frozen=True)
 class Verify(_Where):
     """Check the sums of all results, and run the first epochs of some cells again."""
 
@@ -78,8 +87,14 @@ class Verify(_Where):
     """Of that choice."""
 
 
-StudyCommand: TypeAlias = Run | Resume | Status | Verify
-COMMANDS: dict[str, type[StudyCommand]] = {"run": Run, "resume": Resume, "status": Status, "verify": Verify}
+StudyCommand: TypeAlias = Run | Resume | Status | Report | Verify
+COMMANDS: dict[str, type[StudyCommand]] = {
+    "run": Run,
+    "resume": Resume,
+    "status": Status,
+    "report": Report,
+    "verify": Verify,
+}
 
 
 def study(args: Sequence[str]) -> int:
@@ -119,6 +134,8 @@ def study(args: Sequence[str]) -> int:
             return _run(command, cells, console)
         if isinstance(command, Status):
             return _status(command, cells, console)
+        if isinstance(command, Report):
+            return _report(command, cells, console)
         return _verify(command, cells, console)
     except ValueError as error:
         return _complain(str(error), 2)
@@ -144,6 +161,23 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
             console.print(f"{cell.id}: {cell_status(cell, command.folder())}", markup=False, soft_wrap=True)
     else:
         console.print(status_table(cells, command.folder()))
+    return 0
+
+
+def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
+    try:
+        from inbounds.book.study_report import write_report
+    except ImportError as error:
+        raise StudyError(
+            f"the report draws with Matplotlib ({error}): pip install 'inbounds[book]'"
+        ) from error
+    outcomes = Outcomes.read(command.folder(), cells)
+    try:
+        path = write_report(outcomes, command.out)
+    except OSError as error:
+        raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
+    console.print(f"{len(outcomes.finished)} of {len(cells)} cells are finished", markup=False)
+    console.print(f"report: {path}", markup=False, soft_wrap=True)
     return 0
 
 

@@ -1,0 +1,134 @@
+"""A page of figures and tables in one HTML file that asks nothing of any other: no script, no font, no server."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+from inbounds.book.alt_text import PIXELS_PER_INCH, png_bytes
+
+_CSS = """
+:root { color-scheme: light; }
+body { font: 17px/1.5 system-ui, sans-serif; color: #22272d; background: #fff; margin: 0 auto; max-width: 82rem;
+  padding: 1rem; }
+h1, h2, h3, p, ul, figure { max-width: 48rem; }
+h1, h2, h3 { line-height: 1.25; }
+h2 { margin-top: 3rem; border-top: 2px solid #5f6770; padding-top: .6rem; }
+a { color: #0b4f9e; }
+figure { margin: 1.5rem 0; }
+figure img { max-width: 100%; height: auto; display: block; }
+figcaption { color: #3d444c; }
+.table { overflow-x: auto; margin: 1.5rem 0; }
+table { border-collapse: collapse; font-size: .82rem; font-variant-numeric: tabular-nums; }
+caption { text-align: left; padding-bottom: .4rem; font-size: .95rem; }
+th, td { padding: .2rem .7rem .2rem 0; text-align: right; vertical-align: top; }
+th { border-bottom: 1.5px solid #5f6770; }
+tbody tr { border-bottom: 1px solid #dfe3e8; }
+th:first-child, td:first-child, .words { text-align: left; }
+th, td { white-space: nowrap; }
+.long { white-space: normal; min-width: 14rem; }
+.missing { color: #5f6770; font-style: italic; }
+nav ul { columns: 2; }
+"""
+
+
+_LONG = 50  # characters: a table's cell with more of them may break into lines
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """Return the whole page.
+
+    Args:
+        title: of the page, plain text.
+        parts: of its body, HTML.
+
+    Example:
+        >>> page("A & B", [paragraph("x < y")]).count("A &amp; B")
+        2
+    """
+    return "\n".join(
+        [
+            '<!doctype html>\n<html lang="en-GB">\n<head>\n<meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{escape(title)}</title>\n<style>{_CSS}</style>\n</head>\n<body>\n<main>",
+            f"<h1>{escape(title)}</h1>",
+            *parts,
+            "</main>\n</body>\n</html>\n",
+        ]
+    )
+
+
+def heading(text: str, level: int = 2, anchor: str = "") -> str:
+    """Return a heading, plain text, with an optional anchor."""
+    place = f' id="{anchor}"' if anchor else ""
+    return f"<h{level}{place}>{escape(text)}</h{level}>"
+
+
+def contents(sections: Iterable[tuple[str, str]]) -> str:
+    """Return links to sections, given as (anchor, title)."""
+    links = "".join(f'<li><a href="#{anchor}">{escape(title)}</a></li>' for anchor, title in sections)
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """Return a paragraph of plain text; "missing" sets it back."""
+    look = f' class="{kind}"' if kind else ""
+    return f"<p{look}>{escape(text)}</p>"
+
+
+def bullets(items: Iterable[str]) -> str:
+    """Return a list of plain texts."""
+    return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
+
+
+def figure(fig: Figure, alt: str, caption: str = "") -> str:
+    """Return a figure with its alt text, and close it.
+
+    Raises:
+        ValueError: the alt text says less than a sentence would.
+    """
+    if len(alt.split()) < 4:
+        raise ValueError(
+            f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
+        )
+    png = base64.b64encode(png_bytes(fig)).decode("ascii")
+    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
+    plt.close(fig)
+    image = f'<img src="data:image/png;base64,{png}" width="{width}" alt="{escape(alt)}">'
+    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def table(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = (0,)
+) -> str:
+    """Return a table of plain texts.
+
+    Args:
+        caption: what it shows, and of how many seeds.
+        head: titles of the columns.
+        rows: each as long as the head.
+        words: which columns hold words rather than numbers.
+
+    Example:
+        >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
+        True
+    """
+
+    def cell(tag: str, place: int, text: str) -> str:
+        looks = {"words": place in words, "missing": text == "missing", "long": len(text) > _LONG}
+        chosen = " ".join(name for name, wanted in looks.items() if wanted)
+        attribute = f' class="{chosen}"' if chosen else ""
+        return f"<{tag}{attribute}>{escape(text)}</{tag.partition(' ')[0]}>"
+
+    titles = "".join(cell('th scope="col"', i, title) for i, title in enumerate(head))
+    body = "".join(
+        "<tr>" + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>" for row in rows
+    )
+    return (
+        f'<div class="table" tabindex="0"><table><caption>{escape(caption)}</caption>'
+        f"<thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>"
+    )

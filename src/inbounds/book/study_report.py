@@ -1,0 +1,173 @@
+"""`inbounds study report`: everything that the finished cells say, on one page.
+
+    write_report(Outcomes.read(StudyFolder()), Path("study-report.html"))
+
+It works with no cell, with a few and with all of them: what is missing is called missing in its place.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from inbounds.book import report_page as html
+from inbounds.book.figures import FAMILIES
+from inbounds.book.report_arms import HEADS, TITLES, arm_section
+from inbounds.book.report_words import spoken
+from inbounds.book.study_figures import interval_panels
+from inbounds.learning.files import write_whole
+from inbounds.study import analysis
+from inbounds.study.analysis import ENDPOINTS
+from inbounds.study.grid import ARMS, ROBOTS, STUDY_VERSION, Cell
+from inbounds.study.outcomes import Outcome, Outcomes
+from inbounds.study.statistics import Estimate
+from inbounds.study.statistics.settings import LEVEL, RESAMPLES
+
+HOW_TO_READ = (
+    "A cell is one algorithm × family × variant × robot, ten seeds. The unit of analysis is the seed: n counts seeds.",
+    f"Bars and bands are {LEVEL:.0%} intervals over seeds (expanded percentile bootstrap, {RESAMPLES} resamples); a "
+    "curve's band holds at each epoch by itself, and over all robots the plain percentile interval is taken. They say "
+    "what other seeds would have given, nothing about other robots.",
+    "Differences are between families within an algorithm. p-values are of permutation tests, corrected over the six "
+    "robots (Holm). An interval that contains 0 is unresolved: ten seeds a side find differences of about 1.3 standard "
+    "deviations.",
+    "Only whole cells count. One that is not finished is called missing, wherever it belongs.",
+    "Final return, area and test were fixed before the first run, in results/PROTOCOL.md; the tables of what happened "
+    "inside describe and decide nothing.",
+)
+
+
+def write_report(outcomes: Outcomes, path: Path) -> Path:
+    """Write the report as one HTML file that needs no other.
+
+    Args:
+        outcomes: what there is of the study.
+        path: of the file; its folder is made if missing.
+
+    Returns:
+        The path.
+    """
+    sections = [("state", "What there is"), *TITLES.items(), ("provenance", "Provenance")]
+    parts = [
+        html.paragraph(f"Study version {STUDY_VERSION}. {_count(outcomes)}"),
+        html.contents(sections),
+        html.heading("How to read it", 3),
+        html.bullets(HOW_TO_READ),
+        *_state(outcomes),
+    ]
+    for arm in TITLES:
+        parts += _mechanisms(outcomes) if arm == "mechanisms" else arm_section(outcomes, arm)
+    parts += _provenance(outcomes)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, html.page("In Bounds: the study", parts).encode())
+    return path
+
+
+def _count(outcomes: Outcomes) -> str:
+    return f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
+
+
+def _state(outcomes: Outcomes) -> list[str]:
+    rows = []
+    for arm, cells in ARMS.items():
+        counts = [Counter(outcomes.states.get(c.id) for c in cells if c.robot == robot) for robot in ROBOTS]
+        rows.append([TITLES[arm], *(f"{c['finished']} of {c.total()}" if c.total() else "–" for c in counts)])
+    parts = [html.heading("What there is", 2, "state")]
+    parts.append(html.table("Finished cells of those planned, per robot.", ["arm", *ROBOTS], rows))
+    wrong = [
+        f"{name}: {state}" for name, state in outcomes.states.items() if state not in ("finished", "missing")
+    ]
+    if wrong:
+        parts += [html.paragraph("Not used, because they are not what they should be:"), html.bullets(wrong)]
+    return parts
+
+
+# ---- arm 4
+
+GROUPS = {
+    "matched-noise": "Matched initial noise",
+    "raw-cost": "Cost of raw actions",
+    "entropy": "Entropy bonus",
+    "gamma": "Discount 0.9999",
+    "printed": "The two presets, one factor at a time",
+}
+"""First word of a variant → title."""
+
+
+def _mechanisms(outcomes: Outcomes) -> list[str]:
+    parts = [html.heading(TITLES["mechanisms"], 2, "mechanisms")]
+    said = (
+        "Each cell differs in one thing from a cell of arm 1 (or 3), with which it is compared: difference of means, "
+        f"with a {LEVEL:.0%} bootstrap interval, robot by robot, without a test and without a claim over robots."
+    )
+    parts.append(html.paragraph(said))
+    for word, title in GROUPS.items():
+        cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
+        parts.append(html.heading(title, 3))
+        found = [outcomes.finished[cell.id] for cell in cells if cell.id in outcomes.finished]
+        if not found:
+            parts.append(html.paragraph("missing: none of these cells is finished.", "missing"))
+            continue
+        parts += _changes(outcomes, title, cells)
+    return parts
+
+
+def _changes(outcomes: Outcomes, title: str, cells: list[Cell]) -> list[str]:
+    panels: dict[str, dict[str, Estimate | None]] = {}
+    rows = []
+    for cell in cells:
+        outcome = outcomes.finished.get(cell.id)
+        found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
+        panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
+        label = FAMILIES[cell.family].label
+        rows.append([cell.robot, cell.algorithm.upper(), label, cell.variant, *map(spoken, found.values())])
+    fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
+    alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
+        f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
+        for panel, row in panels.items()
+    )
+    head = ["robot", "algorithm", "family", "variant", *HEADS.values()]
+    caption = f"{title}: changed cell minus cell of comparison; missing where either is not finished."
+    return [html.figure(fig, alt, ""), html.table(caption, head, rows, (0, 1, 2, 3))]
+
+
+def _panel(cell: Cell) -> str:
+    """What a panel is called: all that tells the group's cells apart but the family."""
+    return f"{cell.robot}, {cell.algorithm.upper()}\n{cell.variant}"
+
+
+# ---- provenance
+
+
+def _provenance(outcomes: Outcomes) -> list[str]:
+    parts = [html.heading("Provenance", 2, "provenance")]
+    if not outcomes.finished:
+        return [*parts, html.paragraph("missing: no cell is finished.", "missing")]
+    sessions = Counter(
+        _session(session) for o in outcomes.finished.values() for session in o.metadata["sessions"]
+    )
+    rows = [[str(count), *key] for key, count in sessions.items()]
+    head = ["sessions", "commit", "engine", "versions", "processor"]
+    caption = "What the parts of the cells ran on; + after a commit: the engine differed from it."
+    parts.append(html.table(caption, head, rows, (1, 2, 3, 4)))
+    parts.append(html.paragraph(_cost(list(outcomes.finished.values()))))
+    return parts
+
+
+def _session(session: dict[str, object]) -> tuple[str, ...]:
+    versions = session["versions"]
+    assert isinstance(versions, dict)
+    said = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return str(session["commit"])[:10], str(session["engine"])[:10], said, str(session["processor"])
+
+
+def _cost(found: list[Outcome]) -> str:
+    seconds = Counter[str]()
+    for outcome in found:
+        seconds.update(outcome.metadata["seconds"])
+    training, evaluation = seconds["training"], seconds["evaluation"] + seconds["final evaluation"]
+    rest = seconds["total"] - training - evaluation
+    return (
+        f"Engine: {training / 3600:.1f} h of wall time; evaluation {evaluation / training:.1%} of that, "
+        f"the runner itself {rest / training:.1%}."
+    )

@@ -1,0 +1,261 @@
+"""The analysis that `results/PROTOCOL.md` fixed before the first run, number by number.
+
+    outcomes = Outcomes.read(StudyFolder())
+    differences(outcomes, CONTRASTS[0], "final")["Hopper"]
+
+What is missing stays missing: a function of cells that are not all finished returns None in their place. A seed that
+diverged counts with its last return, `Estimate.diverged` says how many do, and `without_diverged=True` repeats
+everything without them. Every number has a random generator of its own, seeded by its name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inbounds.study import statistics
+from inbounds.study.grid import ROBOTS, STUDY_VERSION
+from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
+from inbounds.study.statistics import Comparison, Estimate, Profile
+from inbounds.study.statistics.intervals import StatisticName
+from inbounds.study.statistics.settings import LAST_EVALUATIONS
+
+ENDPOINTS: Mapping[str, str] = MappingProxyType(
+    {"final": "final return", "area": "area under the learning curve", "greedy": "greedy return"}
+)
+"""Name → what it is called; the first two are primary."""
+
+
+class Contrast(NamedTuple):
+    """First minus second, within an algorithm and an arm."""
+
+    arm: str
+    algorithm: str
+    first: str
+    second: str
+
+    @property
+    def columns(self) -> tuple[Column, Column]:
+        """The two columns."""
+        first, second = (Column.within(self.arm, self.algorithm, f) for f in (self.first, self.second))
+        return first, second
+
+
+_PLAN: Sequence[tuple[str, str, Sequence[tuple[str, str]]]] = [
+    ("standard", "ppo", [("logit-normal", "gaussian"), ("beta", "gaussian"), ("logit-normal", "beta")]),
+    ("standard", "trpo", [("logit-normal", "gaussian")]),
+    ("printed", "ppo", [("logit-normal", "gaussian"), ("beta", "gaussian"), ("logit-normal", "beta")]),
+    ("printed", "trpo", [("logit-normal", "gaussian")]),
+    ("beyond", "ppo", [("clipped-gaussian", "gaussian"), ("logit-normal", "clipped-gaussian")]),
+    ("beyond", "trpo", [("clipped-gaussian", "gaussian"), ("logit-normal", "clipped-gaussian")]),
+    ("beyond", "trpo", [("beta", "gaussian"), ("logit-normal", "beta")]),
+]
+CONTRASTS = tuple(Contrast(arm, algorithm, *pair) for arm, algorithm, pairs in _PLAN for pair in pairs)
+"""The differences of the protocol's table, in its order."""
+
+REFERENCE = Column("standard", "ppo", "gaussian")
+"""Whose first epoch is 0 and whose final return is 1 in normalised scores."""
+
+
+def generator_for(*name: object) -> np.random.Generator:
+    """Return the generator of a number, by what the number is called.
+
+    Example:
+        >>> a, b = generator_for("final", "Hopper"), generator_for("final", "Hopper")
+        >>> bool(a.random() == b.random())
+        True
+    """
+    words = "|".join(map(str, ("study", STUDY_VERSION, *name)))
+    return np.random.default_rng(int.from_bytes(hashlib.sha256(words.encode()).digest()[:16]))
+
+
+def scores(outcome: Outcome, endpoint: str, *, without_diverged: bool = False) -> Floats:
+    """Return an endpoint of each seed, `[S]`; NaN where it is missing.
+
+    Args:
+        outcome: of a cell.
+        endpoint: a key of `ENDPOINTS`.
+        without_diverged: count seeds that diverged as missing.
+
+    Raises:
+        ValueError: there is no such endpoint.
+    """
+    if endpoint == "final":
+        values = statistics.final_score(outcome.returns)
+    elif endpoint == "area":
+        values = statistics.area_under_curve(outcome.returns)
+    elif endpoint == "greedy":
+        values = outcome.greedy[:, -LAST_EVALUATIONS:].mean(-1)
+    else:
+        raise ValueError(f"no endpoint {endpoint!r}; choose one of {', '.join(ENDPOINTS)}")
+    return np.where(outcome.diverged, np.nan, values) if without_diverged else values
+
+
+def curve(outcome: Outcome) -> Estimate | None:
+    """Return a cell's learning curve `[E]`: mean over seeds, with a band that holds at each epoch by itself."""
+    if _countable(outcome.returns[:, 0]) < 2:
+        return None
+    estimate = statistics.learning_curve(
+        outcome.returns, generator_for("curve", outcome.cell.id), missing="exclude"
+    )
+    return _marked(estimate, outcome)
+
+
+def estimate(
+    outcome: Outcome, endpoint: str, statistic: StatisticName = "mean", *, without_diverged: bool = False
+) -> Estimate | None:
+    """Return mean or IQM of an endpoint over the seeds of a cell; None where fewer than two seeds have one."""
+    values = scores(outcome, endpoint, without_diverged=without_diverged)
+    if _countable(values) < 2:
+        return None
+    rng = generator_for("estimate", outcome.cell.id, endpoint, statistic, without_diverged)
+    found = statistics.bootstrap(values, rng, statistic=statistic, missing="exclude")
+    return found if without_diverged else _marked(found, outcome)
+
+
+def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
+    """Return the mean return of a cell's final policies under each way to act; empty where they were not kept."""
+    return {
+        way: statistics.bootstrap(
+            values, generator_for("way", outcome.cell.id, way), statistic="mean", missing="exclude"
+        )
+        if _countable(values) >= 2
+        else None
+        for way, values in outcome.ways.items()
+    }
+
+
+def differences(
+    outcomes: Outcomes, contrast: Contrast, endpoint: str, *, without_diverged: bool = False
+) -> dict[str, Comparison]:
+    """Compare two columns robot by robot: difference of means, p-value, p-value after Holm over six robots.
+
+    Args:
+        outcomes: of the study.
+        contrast: what is compared.
+        endpoint: a key of `ENDPOINTS`.
+        without_diverged: leave out seeds that diverged.
+
+    Returns:
+        By robot, all six: where a cell is missing, a comparison without a difference.
+    """
+    first, second = (_scores_by_robot(outcomes, c, endpoint, without_diverged) for c in contrast.columns)
+    rng = generator_for("difference", *contrast, endpoint, without_diverged)
+    rows = statistics.compare(first, second, rng, environments=ROBOTS, statistic="mean", missing="exclude")
+    if without_diverged:
+        return rows
+    for robot, row in rows.items():
+        if row.difference is not None:
+            pair = [o for c in contrast.columns if (o := outcomes.find(c, robot)) is not None]
+            rows[robot] = dataclasses.replace(row, difference=_marked(row.difference, *pair))
+    return rows
+
+
+def change(outcomes: Outcomes, outcome: Outcome, endpoint: str) -> Estimate | None:
+    """Return how far a cell of the fourth arm is from its cell of comparison, in means; None where that is missing."""
+    cell = outcome.cell
+    plain = outcomes.find(Column(cell.arm, cell.algorithm, cell.family, cell.variant).baseline, cell.robot)
+    if plain is None or min(_countable(scores(o, endpoint)) for o in (outcome, plain)) < 2:
+        return None
+    found = statistics.difference(
+        scores(outcome, endpoint),
+        scores(plain, endpoint),
+        generator_for("change", cell.id, endpoint),
+        statistic="mean",
+        missing="exclude",
+    )
+    return _marked(found, outcome, plain)
+
+
+def references(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
+    """Return by robot the returns that become 0 and 1; without the robots where that cell is missing.
+
+    Where the second does not exceed the first, no score can be normalised: see `normalized`.
+    """
+    cells = {robot: outcomes.find(REFERENCE, robot) for robot in ROBOTS}
+    return {
+        robot: (float(np.nanmean(o.returns[:, 0])), float(np.nanmean(scores(o, "final"))))
+        for robot, o in cells.items()
+        if o is not None and np.isfinite(o.returns).any()
+    }
+
+
+def normalized(
+    outcomes: Outcomes, column: Column, endpoint: str, *, without_diverged: bool = False
+) -> dict[str, Floats] | None:
+    """Return a column's normalised scores `[S]` by robot, None unless it is complete on all six.
+
+    A robot whose references are not in order is left out, as the protocol says.
+    """
+    known = references(outcomes)
+    raw = _scores_by_robot(outcomes, column, endpoint, without_diverged)
+    if not (known.keys() >= set(ROBOTS) and raw.keys() >= set(ROBOTS)):
+        return None
+    return {
+        robot: statistics.normalize_scores(raw[robot], *known[robot])
+        for robot in ROBOTS
+        if known[robot][1] > known[robot][0]
+    }
+
+
+def aggregate(
+    outcomes: Outcomes, column: Column, endpoint: str, *, without_diverged: bool = False
+) -> Estimate | None:
+    """Return the IQM of a column's normalised scores over all robots, None unless it is complete."""
+    found = normalized(outcomes, column, endpoint, without_diverged=without_diverged)
+    if not found:
+        return None
+    rng = generator_for("aggregate", *column, endpoint, without_diverged)
+    return statistics.aggregate(found, rng, missing="exclude")
+
+
+def improvement(
+    outcomes: Outcomes, contrast: Contrast, endpoint: str, *, without_diverged: bool = False
+) -> Estimate | None:
+    """Return the probability of improvement of first over second, None unless both are complete on all six robots."""
+    first, second = (
+        _scores_by_robot(outcomes, column, endpoint, without_diverged) for column in contrast.columns
+    )
+    if not (first.keys() >= set(ROBOTS) and second.keys() >= set(ROBOTS)):
+        return None
+    rng = generator_for("improvement", *contrast, endpoint, without_diverged)
+    return statistics.probability_of_improvement(first, second, rng, missing="exclude")
+
+
+def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: ArrayLike) -> Profile | None:
+    """Return the performance profile of a column's normalised scores, None unless it is complete."""
+    found = normalized(outcomes, column, endpoint)
+    if not found:
+        return None
+    return statistics.performance_profile(
+        found, thresholds, generator_for("profile", *column, endpoint), missing="exclude"
+    )
+
+
+def _scores_by_robot(
+    outcomes: Outcomes, column: Column, endpoint: str, without_diverged: bool
+) -> dict[str, Floats]:
+    """The robots on which a column is finished and at least two seeds count."""
+    found = {}
+    for robot in ROBOTS:
+        if (outcome := outcomes.find(column, robot)) is not None:
+            values = scores(outcome, endpoint, without_diverged=without_diverged)
+            if _countable(values) >= 2:
+                found[robot] = values
+    return found
+
+
+def _countable(values: Floats) -> int:
+    return int(np.isfinite(values).sum())
+
+
+def _marked(estimate: Estimate, *outcomes: Outcome) -> Estimate:
+    """Say how many of the seeds that count have diverged."""
+    diverged = sum(int((o.diverged & np.isfinite(o.returns).all(1)).sum()) for o in outcomes)
+    return dataclasses.replace(estimate, diverged=diverged)

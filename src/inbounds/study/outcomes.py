@@ -1,0 +1,146 @@
+"""The finished cells of a study, as arrays with the seeds in front.
+
+    >>> from pathlib import Path
+    >>> Outcomes.read(StudyFolder(Path("no/results"))).finished
+    {}
+
+Only whole cells are read: one that is not finished, damaged, or of another configuration is named, not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from inbounds.study import store
+from inbounds.study.grid import ARMS, Cell, study_cells
+from inbounds.study.statistics import carry_forward
+from inbounds.study.store import State, StudyFolder
+
+Floats = NDArray[np.float64]
+
+
+class Column(NamedTuple):
+    """What is the same on every robot: a column of the protocol's tables."""
+
+    arm: str
+    algorithm: str
+    family: str
+    variant: str = ""
+
+    @classmethod
+    def within(cls, arm: str, algorithm: str, family: str) -> Column:
+        """Return an arm's column, or that of the first arm where the arm lacks it and is compared with that one."""
+        own = any((cell.algorithm, cell.family) == (algorithm, family) for cell in ARMS[arm])
+        return cls(arm if own else "standard", algorithm, family)
+
+    @property
+    def baseline(self) -> Column:
+        """What a column of the fourth arm is compared with: nothing changed in it."""
+        first = any((c.algorithm, c.family) == (self.algorithm, self.family) for c in ARMS["standard"])
+        return Column("standard" if first else "beyond", self.algorithm, self.family)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a finished cell left."""
+
+    cell: Cell
+    """Which."""
+    steps: Floats
+    """`[E]` env steps of each seed at the end of each epoch."""
+    returns: Floats
+    """`[S, E]` mean training return; epochs without one filled by the protocol's rule (`carry_forward`)."""
+    greedy: Floats
+    """`[S, K]` greedy return of each evaluation, filled likewise."""
+    diverged: NDArray[np.bool_]
+    """`[S]` whether the seed's weights ceased to be finite."""
+    measured: Mapping[str, Floats]
+    """`[S, K]` by the names of `inbounds.study.store.MEASURED`, as measured."""
+    metadata: Mapping[str, Any]
+    """What the cell's file says of itself."""
+    ways: Mapping[str, Floats]
+    """`[S]` mean return of the final policies by way to act (mean, median, mode, sample), where they were kept."""
+
+    @classmethod
+    def of(
+        cls, cell: Cell, table: pa.Table, metadata: Mapping[str, Any], returns: pa.Table | None = None
+    ) -> Outcome:
+        """Take a cell's rows apart.
+
+        Args:
+            cell: whose they are.
+            table: as `inbounds.study.read_cell` reads it.
+            metadata: as `inbounds.study.store.read_metadata` reads it.
+            returns: of the final policies, where they were kept.
+        """
+        seeds = len(cell.seeds)
+
+        def by_seed(name: str) -> NDArray[Any]:
+            values = table[name].to_numpy(zero_copy_only=False)
+            return np.ascontiguousarray(values.reshape(-1, seeds).T)  # rows go epoch by epoch, seed by seed
+
+        at = table["greedy_return"].is_valid().to_numpy(zero_copy_only=False)[::seeds]  # [E]
+        measured = {name: by_seed(name)[:, at] for name in table.column_names if name in store.MEASURED}
+        return cls(
+            cell=cell,
+            steps=by_seed("env_steps")[0].astype(np.float64),
+            returns=carry_forward(by_seed("return_mean")),
+            greedy=carry_forward(measured["greedy_return"]),
+            diverged=np.asarray(by_seed("diverged").any(1), np.bool_),
+            measured=measured,
+            metadata=metadata,
+            ways={} if returns is None else _ways(returns, seeds),
+        )
+
+
+def _ways(returns: pa.Table, seeds: int) -> dict[str, Floats]:
+    """Mean returns `[S]` by way to act; rows go way by way, seed by seed, episode by episode."""
+    names = returns["greedy"].to_pylist()
+    values = returns["return"].to_numpy()
+    return {
+        way: values[[name == way for name in names]].reshape(seeds, -1).mean(1)
+        for way in dict.fromkeys(names)
+    }
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What there is of a study."""
+
+    finished: Mapping[str, Outcome]
+    """By the cell's id."""
+    states: Mapping[str, State]
+    """Of every cell, by its id."""
+    folder: StudyFolder
+    """Where it was found."""
+
+    @classmethod
+    def read(cls, folder: StudyFolder, cells: Sequence[Cell] | None = None) -> Outcomes:
+        """Read all finished cells.
+
+        Args:
+            folder: where the results are.
+            cells: of the study; None is all of it.
+        """
+        cells = study_cells() if cells is None else cells
+        states = {cell.id: folder.state(cell) for cell in cells}
+        finished = {}
+        for cell in cells:
+            if states[cell.id] == "finished":
+                path = folder.cell_file(cell)
+                returns = store.read_cell(folder.policy_files(cell)[1]) if cell.keeps_policies else None
+                finished[cell.id] = Outcome.of(
+                    cell, store.read_cell(path), store.read_metadata(path), returns
+                )
+        return cls(finished, states, folder)
+
+    def find(self, column: Column, robot: str) -> Outcome | None:
+        """Return a column's cell on a robot, None where it is not finished."""
+        parts = (column.arm, robot.lower(), column.algorithm, column.family, column.variant)
+        return self.finished.get("-".join(part for part in parts if part))
