@@ -13,7 +13,7 @@ from typing import Any
 
 import torch
 
-PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "torch")
+PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "scipy", "torch")
 ENGINE = ("distributions", "robots", "learning")  # the rooms of the package that a cell's numbers come from
 
 
