@@ -109,7 +109,7 @@ def markdown(results: Mapping[str, Any]) -> str:
             lines.append(
                 f"| {label(name)} | {spread(steps_per_second(results, env, name), 0)} | {relative} |"
             )
-    lines += ["", "## How", "", *_how(results), ""]
+    lines += ["", "## How", "", *how(results), ""]
     return "\n".join(lines)
 
 
@@ -118,7 +118,8 @@ def _ratio_row(results: Mapping[str, Any], env: str, ours: str, theirs: str, ver
     return f"| {env} | {label(ours)} | {label(theirs)} | {' | '.join(clocks)} | {verdict} |"
 
 
-def _how(results: Mapping[str, Any]) -> list[str]:
+def how(results: Mapping[str, Any]) -> list[str]:
+    """Return what the numbers depend on, a Markdown bullet each: date, machine, versions, work, who is absent."""
     machine, work = results["machine"], results["work"]
     lines = [
         f"* {results['date']}, `{results['command']}`, {results['repeats']} interleaved repeats.",

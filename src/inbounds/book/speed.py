@@ -1,0 +1,255 @@
+"""What the benchmark and the validation found, as the book shows it; what was not measured is called missing.
+
+`make bench` writes `speed.json`, `python -m benchmarks.validate` writes `validation.json` and `curves.parquet`, both
+below `benchmarks/results`. Ratios, medians and plots are those of `benchmarks.report` and `benchmarks.validate`; here
+they become a page's tables. The benchmark is part of the source tree and not of the installed package::
+
+    results = speed.read_speed()  # None: nobody has measured yet
+    speed.ratio_table(results)
+
+The text form of a table holds no number: the stored notebook stays the same when the benchmark is run again.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeAlias
+
+from inbounds.book import alt_text
+from inbounds.book.report_page import bullets, paragraph, table
+
+ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py
+RESULTS = ROOT / "benchmarks" / "results"
+
+Results: TypeAlias = Mapping[str, Any]
+"""What a JSON file of measurements holds."""
+
+OURS = "inbounds-ppo-10"
+COMPARISONS = (
+    (OURS, "sb3-ppo"),
+    (OURS, "sb3-ppo-plain"),
+    (OURS, "sbx-ppo"),
+    (OURS, "cleanrl-ppo"),
+    (OURS, "inbounds-ppo-1"),
+    ("inbounds-trpo-10", "sb3-trpo"),
+    (OURS, "floor"),
+)
+"""Rows of the table of ratios: who, over whom."""
+NO_SPEED = (
+    "Not measured in this copy of the book. `make bench` measures it (about fifteen minutes on a quiet machine) and "
+    "writes `benchmarks/results/speed.json`; then build the book again."
+)
+NO_VALIDATION = (
+    "Not measured in this copy of the book. `python -m benchmarks.validate` trains both sides (about 45 minutes on two "
+    "cores) and writes `benchmarks/results/validation`; then build the book again."
+)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Something that a page shows as HTML, and whose text form only says what it is."""
+
+    what: str
+    """In a few words, without numbers."""
+    html: str
+
+    def __repr__(self) -> str:
+        return f"<{self.what}>"
+
+    def _repr_html_(self) -> str:
+        return f'<div style="overflow-x:auto">{self.html}</div>'
+
+
+def read_speed(folder: Path = RESULTS) -> Results | None:
+    """Return what `make bench` measured, or None if there is no `speed.json` in the folder."""
+    return _read(folder / "speed.json")
+
+
+def read_validation(folder: Path = RESULTS / "validation") -> Results | None:
+    """Return the validation's verdicts, or None; the curves' table is added as `curves`."""
+    found, path = _read(folder / "validation.json"), folder / "curves.parquet"
+    if found is None or not path.is_file():
+        return None
+    import pyarrow.parquet as pq
+
+    return {**found, "curves": pq.read_table(path)}
+
+
+def ratio_table(results: Results | None) -> Shown:
+    """Return the ratios of steps per second, a column per robot: median and range over the repeats.
+
+    Args:
+        results: from `read_speed`.
+
+    Example:
+        >>> ratio_table(None)
+        <speed: ratios>
+    """
+    what = "speed: ratios"
+    if results is None:
+        return _missing(what, NO_SPEED)
+    report, measured = _benchmarks("report"), results["measurements"]
+    rows = []
+    for ours, theirs in COMPARISONS:
+        there = [{ours, theirs} <= measured[env].keys() for env in measured]
+        if any(there):
+            cells = [
+                report.spread(report.ratio(results, env, ours, theirs)) if has else "–"
+                for env, has in zip(measured, there, strict=True)
+            ]
+            rows.append([f"{_label(ours)}, over {_label(theirs)}", *cells])
+    caption = (
+        f"Steps per second, ratios: median (range) of {results['repeats']} interleaved repeats on one core."
+    )
+    return Shown(what, table(caption, ["Who, over whom", *measured], rows))
+
+
+def rate_table(results: Results | None) -> Shown:
+    """Return env steps per second, a row per contestant and a column per robot: median and range."""
+    what = "speed: steps per second"
+    if results is None:
+        return _missing(what, NO_SPEED)
+    report, measured = _benchmarks("report"), results["measurements"]
+    names = list(dict.fromkeys(name for env in measured for name in measured[env]))
+    rows = [
+        [
+            _label(name),
+            *(
+                report.spread(report.steps_per_second(results, env, name), 0)
+                if name in measured[env]
+                else "–"
+                for env in measured
+            ),
+        ]
+        for name in names
+    ]
+    return Shown(what, table("Env steps per second: median (range).", ["Who", *measured], rows))
+
+
+def how_measured(results: Results | None) -> Shown:
+    """Return the circumstances of the benchmark: date, command, machine, versions, work, who could not take part."""
+    what = "speed: how it was measured"
+    if results is None:
+        return _missing(what, NO_SPEED)
+    lines = [line.removeprefix("* ") for line in _benchmarks("report").how(results)]
+    return Shown(what, _code(bullets(lines)))
+
+
+def show_speed(results: Results | None) -> Shown | None:
+    """Put the plot of steps per second, with the floor, on the page; if there is none, return the note that says so.
+
+    Args:
+        results: from `read_speed`.
+    """
+    if results is None:
+        return _missing("speed: plot", NO_SPEED)
+    fig, _ = _benchmarks("report").plot(results)
+    alt_text.show(
+        fig,
+        alt="Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per "
+        "contestant: median as a marker, range over the repeats as a line, the floor as a dashed vertical line.",
+    )
+    return None
+
+
+def verdict_table(validation: Results | None) -> Shown:
+    """Return the verdicts of the two one-sided tests, a row per robot.
+
+    Args:
+        validation: from `read_validation`.
+    """
+    what = "validation: verdicts"
+    if validation is None:
+        return _missing(what, NO_VALIDATION)
+    who = _benchmarks("validate")
+    head = [
+        "Robot",
+        "In Bounds",
+        who.PEER,
+        "ratio (90 % interval)",
+        "p",
+        f"within ± {validation['margin']:.0%}",
+    ]
+    rows = [[env, *_verdict(found, who)] for env, found in validation["verdicts"].items()]
+    caption = (
+        f"Mean area under the learning curve ± standard deviation over {validation['seeds']} seeds a side, "
+        f"{validation['env_steps']:,} env steps each."
+    )
+    return Shown(what, table(caption, head, rows, words=(0, 5)))
+
+
+def show_validation(validation: Results | None) -> Shown | None:
+    """Put both sides' learning curves on the page; if there are none, return the note that says so.
+
+    Args:
+        validation: from `read_validation`.
+    """
+    if validation is None:
+        return _missing("validation: curves", NO_VALIDATION)
+    fig, _ = _benchmarks("validate").plot(validation["curves"], validation["verdicts"])
+    alt_text.show(
+        fig,
+        alt="Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this "
+        "engine, a solid line, and of stable-baselines3, a dashed line.",
+    )
+    return None
+
+
+def _verdict(found: Results, who: ModuleType) -> Sequence[str]:
+    means = [f"{found[side]['mean']:,.0f} ± {found[side]['std']:,.0f}" for side in (who.OURS, who.PEER)]
+    if "undecided" in found:
+        return [*means, "–", "–", f"undecided: {found['undecided']}"]
+    verdict = "equivalent"
+    if not found["equivalent"]:
+        verdict = (
+            f"not shown; with equal means {found['seeds_needed']} seeds a side would show it in 8 of 10 cases"
+        )
+    ratio = f"{found['ratio']:.2f} ({found['low']:.2f} to {found['high']:.2f})"
+    return [*means, ratio, f"{found['p_value']:.3f}", verdict]
+
+
+def _read(path: Path) -> Results | None:
+    if not path.is_file():
+        return None
+    found: Results = json.loads(path.read_text(encoding="utf8"))
+    return found
+
+
+def _missing(what: str, why: str) -> Shown:
+    return Shown(what, _code(paragraph(why, "missing")))
+
+
+def _code(html: str) -> str:
+    """Let words between backticks stand in the typewriter's face."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", html)
+
+
+def _label(name: str) -> str:
+    """Return a contestant's name; "… and so on" gets its beginning, for no line above may have it."""
+    label: str = _benchmarks("report").label(name)
+    start = "In Bounds PPO, " if name.startswith("inbounds") else "stable-baselines3 PPO, "
+    return label.replace("… ", start)
+
+
+def _benchmarks(name: str) -> ModuleType:
+    """Return a module of the source tree's folder of benchmarks, which no installed package holds.
+
+    Raises:
+        ModuleNotFoundError: this package was installed without its source tree.
+    """
+    if not (ROOT / "benchmarks" / f"{name}.py").is_file():
+        raise ModuleNotFoundError(
+            "the benchmarks are not part of the installed package: clone the project, and `pip install -e .` in it"
+        )
+    sys.path.append(str(ROOT))
+    try:
+        return importlib.import_module(f"benchmarks.{name}")
+    finally:
+        sys.path.remove(str(ROOT))

@@ -1,0 +1,188 @@
+"""The book's tables of speed hold what was measured, and say so where nothing was."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from inbounds.book import speed
+
+
+def turn(steps: int, seconds: float) -> dict[str, float]:
+    return {"steps": steps, "seconds": seconds, "cpu_seconds": seconds / 2, "peak_bytes": 1.5e9}
+
+
+def made_up_speed() -> dict[str, Any]:
+    hopper = {
+        "floor": [turn(100, 0.5)] * 3,
+        "inbounds-ppo-10": [turn(100, s) for s in (1.0, 2.0, 4.0)],
+        "sb3-ppo": [turn(10, s) for s in (1.0, 2.0, 8.0)],
+        "sb3-ppo-plain": [turn(10, 1.0)] * 3,
+    }
+    ant = {"inbounds-ppo-10": hopper["inbounds-ppo-10"], "inbounds-ppo-1": [turn(10, 0.3)] * 3}
+    return {
+        "date": "2026-01-01",
+        "command": "python -m made_up",
+        "machine": {"processor": "P & Q", "cores": 2, "load": [0, 0, 0]},
+        "versions": {"torch": "2"},
+        "work": {"horizon": 2048, "num_epochs": 10, "minibatch_size": 64, "hidden": [64, 64]},
+        "repeats": 3,
+        "unavailable": {"sbx-ppo": "No module named 'sbx'"},
+        "measurements": {"Hopper-v5": hopper, "Ant-v5": ant},
+    }
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Any:
+    (tmp_path / "speed.json").write_text(json.dumps(made_up_speed()))
+    return speed.read_speed(tmp_path)
+
+
+def rows(html: str) -> list[list[str]]:
+    body = html.partition("<tbody>")[2]
+    return [
+        [cell.partition(">")[2].partition("<")[0] for cell in row.split("<td")[1:]]
+        for row in body.split("<tr>")[1:]
+    ]
+
+
+def test_ratios_are_paired_and_the_floor_comes_last(results: Any) -> None:
+    assert rows(speed.ratio_table(results).html) == [
+        ["In Bounds PPO, S = 10, over stable-baselines3 PPO", "10.00 (10.00 to 20.00)", "–"],
+        [
+            "In Bounds PPO, S = 10, over stable-baselines3 PPO, observations as they are",
+            "5.00 (2.50 to 10.00)",
+            "–",
+        ],
+        ["In Bounds PPO, S = 10, over In Bounds PPO, S = 1", "–", "1.50 (0.75 to 3.00)"],
+        ["In Bounds PPO, S = 10, over the floor", "0.25 (0.12 to 0.50)", "–"],
+    ]
+
+
+def test_rates_are_those_of_all_who_took_part(results: Any) -> None:
+    found = {row[0]: row[1:] for row in rows(speed.rate_table(results).html)}
+    assert found["In Bounds PPO, S = 10"] == ["50 (25 to 100)", "50 (25 to 100)"]
+    assert found["In Bounds PPO, S = 1"] == ["–", "33 (33 to 33)"]
+    assert len(found) == 5
+
+
+def test_the_circumstances_are_told(results: Any) -> None:
+    html = speed.how_measured(results).html
+    for words in (
+        "<code>python -m made_up</code>",
+        "P &amp; Q",
+        "3 interleaved repeats",
+        "Not measured: sbx-ppo",
+    ):
+        assert words in html
+
+
+def test_what_was_not_measured_is_called_missing(tmp_path: Path) -> None:
+    assert speed.read_speed(tmp_path) is None
+    assert speed.read_validation(tmp_path) is None
+    for shown in (
+        speed.ratio_table(None),
+        speed.rate_table(None),
+        speed.how_measured(None),
+        speed.show_speed(None),
+    ):
+        assert shown is not None
+        assert "<code>make bench</code>" in shown._repr_html_()
+    for shown in (speed.verdict_table(None), speed.show_validation(None)):
+        assert shown is not None
+        assert "benchmarks.validate" in shown._repr_html_()
+
+
+def test_the_stored_text_is_the_same_measured_or_not(results: Any) -> None:
+    """A new benchmark must not make the stored notebooks stale."""
+    for table in (speed.ratio_table, speed.rate_table, speed.how_measured):
+        assert repr(table(results)) == repr(table(None))
+    assert repr(speed.verdict_table(None)) == "<validation: verdicts>"
+
+
+@pytest.fixture
+def on_page(monkeypatch: pytest.MonkeyPatch) -> list[tuple[dict, dict]]:
+    """Data and metadata of what is displayed."""
+    caught: list[tuple[dict, dict]] = []
+    monkeypatch.setattr(
+        "IPython.display.display", lambda data, metadata, raw: caught.append((data, metadata))
+    )
+    return caught
+
+
+def test_the_plot_has_its_alt_text(results: Any, on_page: list) -> None:
+    assert speed.show_speed(results) is None
+    ((data, metadata),) = on_page
+    assert "logarithmic axis" in metadata["image/png"]["alt"]
+    assert not any(character.isdigit() for character in data["text/plain"])
+    assert not plt.get_fignums()
+
+
+def validation(folder: Path) -> Any:
+    rng = np.random.default_rng(0)
+    table = {"env": [], "who": [], "seed": [], "env_steps": [], "return_mean": []}
+    for who in ("inbounds", "stable-baselines3"):
+        for seed in range(3):
+            for epoch in range(4):
+                values = ("Hopper-v5", who, seed, 2048 * (epoch + 1), 100 * epoch + rng.normal())
+                for column, value in zip(table.values(), values, strict=True):
+                    column.append(value)
+    pq.write_table(pa.table(table), folder / "curves.parquet")
+    side = {"mean": 1234.4, "std": 56.0}
+    sides = {"inbounds": side, "stable-baselines3": side}
+    decided = {
+        "ratio": 1.012,
+        "low": 0.93,
+        "high": 1.1,
+        "p_value": 0.0123,
+        "equivalent": True,
+        "seeds_needed": 8,
+    }
+    verdicts = {
+        "Hopper-v5": sides | decided,
+        "Ant-v5": sides | decided | {"equivalent": False, "seeds_needed": 31},
+        "Walker2d-v5": sides | {"undecided": "train longer"},
+    }
+    found = {"seeds": 3, "env_steps": 8192, "margin": 0.15, "verdicts": verdicts}
+    (folder / "validation.json").write_text(json.dumps(found))
+    return speed.read_validation(folder)
+
+
+def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
+    html = speed.verdict_table(validation(tmp_path)).html
+    same = ["1,234 ± 56", "1,234 ± 56"]
+    hopper, ant, walker = rows(html)
+    assert hopper == ["Hopper-v5", *same, "1.01 (0.93 to 1.10)", "0.012", "equivalent"]
+    assert ant[-1].startswith("not shown; with equal means 31 seeds")
+    assert walker == ["Walker2d-v5", *same, "–", "–", "undecided: train longer"]
+    assert "3 seeds a side, 8,192 env steps" in html
+    assert "within ± 15%" in html
+
+
+def test_the_curves_of_both_sides_are_drawn(tmp_path: Path, on_page: list) -> None:
+    found = validation(tmp_path)
+    verdicts = {"Hopper-v5": found["verdicts"]["Hopper-v5"]}
+    assert speed.show_validation({**found, "verdicts": verdicts}) is None
+    ((data, metadata),) = on_page
+    assert "stable-baselines3" in metadata["image/png"]["alt"]
+
+
+def test_without_the_source_tree_the_error_says_what_to_do(
+    results: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(speed, "ROOT", tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="clone the project"):
+        speed.ratio_table(results)
+
+
+def test_the_path_is_left_as_it_was(results: Any) -> None:
+    import sys
+
+    before = list(sys.path)
+    speed.ratio_table(results)
+    assert sys.path == before
