@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pytest
 
@@ -53,9 +54,10 @@ def republish(folder: StudyFolder, table: pa.Table | None = None, **metadata: An
 def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
     findings = verify([CELL, small_cell("trpo")], folder, epochs=10)
     assert bad(findings) == []
-    assert [finding.message for finding in findings] == [
-        "3 of 3 files have their checksums",
-        "10 epochs repeated exactly",
+    assert [finding[::2] for finding in findings] == [
+        ("checksums.txt", "3 of 3 files have their checksums"),
+        (CELL.id, "10 epochs repeated exactly"),
+        ("trpo × gaussian", "skipped: none of its cells is finished"),
     ]
 
 
@@ -104,12 +106,48 @@ def test_one_other_number_is_found(done: StudyFolder, column: str) -> None:
     assert first_mismatch(table, table) == ""
 
 
+@pytest.mark.parametrize(
+    ("expected", "found", "where"),
+    [
+        ([1.0, None, np.nan], [1.0, None, np.nan], ""),
+        ([1.0, None, np.nan], [1.0, None, 2.0], "kl is 2.0 instead of nan in epoch 1, seed 0"),
+        ([1.0, None, 2.0], [1.0, None, np.nan], "kl is nan instead of 2.0 in epoch 1, seed 0"),
+        ([np.nan, None, 2.0], [np.nan, None, 3.0], "kl is 3.0 instead of 2.0 in epoch 1, seed 0"),
+        ([1.0, None, 2.0], [1.0, np.nan, 2.0], "kl is nan instead of None in epoch 0, seed 1"),
+        ([1.0, np.nan, 2.0], [1.0, None, 2.0], "kl is None instead of nan in epoch 0, seed 1"),
+        ([0.0, None, 2.0], [-0.0, None, 2.0], ""),
+    ],
+)
+def test_nan_and_null_are_values_like_others(
+    expected: list[float | None], found: list[float | None], where: str
+) -> None:
+    def rows(values: list[float | None]) -> pa.Table:
+        column = pa.array(values, pa.float32(), from_pandas=False)
+        return pa.table({"epoch": [0, 0, 1], "seed": [0, 1, 0], "kl": column})
+
+    assert first_mismatch(rows(expected), rows(found)) == where
+
+
 def test_another_engine_is_found(folder: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     real = ppo.clipped_surrogate
     monkeypatch.setattr(ppo, "clipped_surrogate", lambda *args: 1.0001 * real(*args))
     finding = check_rerun(CELL, folder, 10)
     assert not finding.ok
     assert "the engine now gives other results; a new study version is due" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("versions", "exact"),
+    [({"torch": "0"}, False), ({"scipy": "0"}, False), ({"inbounds": "0", "python": "2"}, True)],
+)
+def test_wheels_decide_whether_rows_must_be_repeated(
+    folder: StudyFolder, versions: dict[str, str], exact: bool
+) -> None:
+    (session,) = store.read_metadata(folder.cell_file(CELL))["sessions"]
+    republish(folder, sessions=[session | {"versions": session["versions"] | versions}])
+    finding = check_rerun(CELL, folder, 1)
+    assert finding.ok
+    assert ("repeated exactly" in finding.message) is exact
 
 
 def test_on_another_machine_the_first_rewards_are_compared(folder: StudyFolder) -> None:

@@ -26,6 +26,7 @@ from inbounds.learning import TrainConfig
 from inbounds.learning.files import DamagedFileError, write_whole
 from inbounds.learning.run_files import METADATA_KEY, metadata_of
 from inbounds.study.claim import file_lock
+from inbounds.study.configuration import differences
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 
 CHECKSUMS_FILE = "checksums.txt"
@@ -118,7 +119,7 @@ class StudyFolder:
             return "damaged"
         if any(not file.is_file() or sums.get(self._name(file)) != sha256(file) for file in self.files(cell)):
             return "damaged"
-        return "finished" if metadata["digest"] == cell.digest else "another configuration"
+        return "finished" if is_of(cell, metadata) else "another configuration"
 
     def checksums(self) -> dict[str, str]:
         """Return SHA-256 by file name, relative to the results; empty if there is no list."""
@@ -146,6 +147,11 @@ class StudyFolder:
 
     def _name(self, path: Path) -> str:
         return path.relative_to(self.results).as_posix()
+
+
+def is_of(cell: Cell, metadata: Mapping[str, Any]) -> bool:
+    """Whether a file that says so much of itself is of a cell, of this version of the study."""
+    return metadata["study_version"] == STUDY_VERSION and not differences(cell.config, metadata["config"])
 
 
 def sha256(path: Path) -> str:
@@ -256,7 +262,7 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
         raise _damaged(Path(path), error) from error
-    if not {"digest", "study_version", "id"} <= found.keys():
+    if not {"config", "study_version", "id"} <= found.keys():
         raise _damaged(Path(path), "it is no cell of a study")
     return found
 

@@ -8,7 +8,7 @@ compared, to `TOLERANCE`.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,17 +17,21 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from inbounds.learning import TrainConfig
 from inbounds.learning.files import DamagedFileError
-from inbounds.learning.training import describe
 from inbounds.study import store
-from inbounds.study.grid import STUDY_VERSION, Cell
+from inbounds.study.configuration import differences
+from inbounds.study.grid import Cell
 from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.provenance import provenance
 from inbounds.study.store import CHECKSUMS_FILE, StudyFolder
 
 TOLERANCE = 1e-3
 """Of rewards, absolute and relative, in the first steps on another machine."""
+
+
+WHEELS = ("torch", "mujoco", "gymnasium", "numpy", "scipy")
+"""The packages whose versions decide the last bits of a result."""
+NOTHING_TO_RERUN = "skipped: none of its cells is finished"
 
 
 class Finding(NamedTuple):
@@ -55,7 +59,7 @@ def verify(
         cells: of the study; those without results are passed over.
         folder: where the results are.
         epochs: to run again, of each chosen cell.
-        rerun: which cells; None is the first finished one of each algorithm × family.
+        rerun: which cells; None is the first finished one of each algorithm × family, () none.
         on_finding: called with each finding as it is made.
 
     Returns:
@@ -69,21 +73,33 @@ def verify(
 
     for finding in [*check_sums(folder), *check_cells(cells, folder)]:
         say(finding)
-    finished = [cell for cell in cells if folder.state(cell) == "finished"]
-    for cell in representatives(finished) if rerun is None else rerun:
+    if rerun is None:
+        for algorithm, family in columns(cells):
+            say(check_column(cells, folder, algorithm, family, epochs))
+    for cell in rerun or ():
         say(check_rerun(cell, folder, epochs))
     return findings
 
 
-def representatives(cells: Sequence[Cell]) -> list[Cell]:
-    """Return the first cell of each algorithm × family.
+def columns(cells: Sequence[Cell]) -> list[tuple[str, str]]:
+    """Return each algorithm × family among some cells, in their order.
 
     Example:
         >>> from inbounds.study.grid import study_cells
-        >>> len(representatives(study_cells()))
+        >>> len(columns(study_cells()))
         8
     """
-    return list({(cell.algorithm, cell.family): cell for cell in reversed(cells)}.values())[::-1]
+    return list(dict.fromkeys((cell.algorithm, cell.family) for cell in cells))
+
+
+def check_column(
+    cells: Sequence[Cell], folder: StudyFolder, algorithm: str, family: str, epochs: int
+) -> Finding:
+    """Run the first epochs of a column's first finished cell again; say so where it has none."""
+    for cell in cells:
+        if (cell.algorithm, cell.family) == (algorithm, family) and folder.state(cell) == "finished":
+            return check_rerun(cell, folder, epochs)
+    return Finding(f"{algorithm} × {family}", True, NOTHING_TO_RERUN)
 
 
 def check_sums(folder: StudyFolder) -> list[Finding]:
@@ -117,7 +133,7 @@ def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Finding]:
         except DamagedFileError as error:
             findings.append(Finding(cell.id, False, str(error)))
             continue
-        if metadata["study_version"] != STUDY_VERSION or metadata["digest"] != cell.digest:
+        if not store.is_of(cell, metadata):
             said = f"of study version {metadata['study_version']} or another configuration: move it away"
             findings.append(Finding(cell.id, False, said))
         elif rows != cell.epochs * len(cell.seeds):
@@ -135,14 +151,14 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
         return Finding(cell.id, False, str(error))
     epochs = min(epochs, cell.epochs)
     run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
-    if different := _differences(run.config, metadata["config"]):
-        return Finding(cell.id, False, f"its file was made with another configuration ({different})")
+    if different := differences(run.config, metadata["config"], free=("epochs", "checkpoint_every")):
+        said = ", ".join(different)
+        return Finding(cell.id, False, f"its file was made with another configuration ({said})")
     for _ in range(epochs):
         run.epoch()
     run.close()
     here, there = provenance(), metadata["sessions"][0]
-    same = all(here[key] == there[key] for key in ("processor", "versions"))
-    if not same:
+    if not _same_arithmetic(here, there):
         return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)
     mismatch = first_mismatch(rows.filter(pc.less(rows["epoch"], epochs)), run.table())
     if mismatch:
@@ -152,6 +168,13 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
             f"{mismatch}: the engine now gives other results; a new study version is due, or the change undone",
         )
     return Finding(cell.id, True, f"{epochs} epochs repeated exactly")
+
+
+def _same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any]) -> bool:
+    """Whether two processes have the processor and the wheels in common, and so compute the same bits."""
+    noted = [name for name in WHEELS if name in there["versions"]]
+    same_wheels = all(here["versions"][name] == there["versions"][name] for name in noted)
+    return same_wheels and here["processor"] == there["processor"]
 
 
 def first_mismatch(expected: pa.Table, found: pa.Table) -> str:
@@ -185,19 +208,6 @@ def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, A
     said = f"rewards of the first {expected.shape[1]} steps differ by at most {error:.1e} (tolerance {TOLERANCE:g})"
     ran = f"; another processor or other wheels than {metadata['sessions'][0]['processor']}: no exact comparison"
     return Finding(name, bool(error <= TOLERANCE), said + ran)
-
-
-def _differences(config: TrainConfig, stored: dict[str, Any]) -> str:
-    free = ("epochs", "checkpoint_every", "seeds")
-    ours = describe(config)
-    return ", ".join(key for key in ours if key not in free and _plain(ours[key]) != _plain(stored.get(key)))
-
-
-def _plain(value: Any) -> Any:
-    """As JSON gives it back: tuples are lists there."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _data_files(results: Path) -> list[Path]:

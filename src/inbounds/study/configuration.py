@@ -1,0 +1,87 @@
+"""Whether a stored configuration is the one that the engine would run now.
+
+A later engine may have options that a stored configuration does not name. Their defaults keep the old behaviour, or
+else results change and a new study version is due; so an option that is not named there had its default.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from inbounds.learning import TrainConfig
+
+_NO_DEFAULT = object()
+
+
+def differences(
+    config: TrainConfig, stored: Mapping[str, Any], free: Sequence[str] = ("checkpoint_every",)
+) -> list[str]:
+    """Return the options in which a stored configuration differs from one of today.
+
+    Args:
+        config: of today.
+        stored: `inbounds.learning.training.describe` of another time, perhaps by way of JSON.
+        free: options that decide no result.
+
+    Returns:
+        Their names, dotted: "algorithm.gamma".
+
+    Example:
+        >>> from inbounds.learning import preset
+        >>> from inbounds.learning.training import describe
+        >>> config = preset("common", "Hopper-v5")
+        >>> stored = describe(config) | {"normalize_obs": False}
+        >>> differences(config, stored)
+        ['normalize_obs']
+    """
+    ours = {name: value for name, (value, _) in _options(config).items()}
+    defaults = {name: default for name, (_, default) in _options(config).items()}
+    theirs = _leaves(stored)
+    names = [name for name in dict.fromkeys([*ours, *theirs]) if name not in free]
+    return [
+        name
+        for name in names
+        if ours.get(name, _NO_DEFAULT) != theirs.get(name, defaults.get(name, _NO_DEFAULT))
+    ]
+
+
+def _options(config: TrainConfig) -> dict[str, tuple[Any, Any]]:
+    """Values and defaults of all options, by their dotted names."""
+    found: dict[str, tuple[Any, Any]] = {"algorithm_name": (config.algorithm_name, _NO_DEFAULT)}
+
+    def walk(value: Any, prefix: str) -> None:
+        for option in dataclasses.fields(value):
+            name, here = prefix + option.name, getattr(value, option.name)
+            if dataclasses.is_dataclass(here):
+                walk(here, f"{name}.")
+            else:
+                found[name] = _plain(here), _default(option)
+
+    walk(config, "")
+    return found
+
+
+def _default(option: dataclasses.Field[Any]) -> Any:
+    if option.default is not dataclasses.MISSING:
+        return _plain(option.default)
+    if option.default_factory is not dataclasses.MISSING:
+        return _plain(option.default_factory())
+    return _NO_DEFAULT
+
+
+def _leaves(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        found |= (
+            _leaves(value, f"{prefix}{name}.")
+            if isinstance(value, Mapping)
+            else {prefix + name: _plain(value)}
+        )
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """As JSON gives it back: tuples are lists there."""
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,60 @@
+"""The shipped results are what they say, and the engine still gives them: a change that alters them fails here.
+
+On the processor and with the wheels of a cell's run its first two epochs must be repeated exactly; elsewhere the
+rewards of the first steps are compared (`inbounds.study.verify`), and the golden runs of the engine's own tests stand in.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from inbounds.study import StudyFolder, study_cells
+from inbounds.study.grid import STUDY_VERSION
+from inbounds.study.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
+
+ROOT = Path(__file__).parents[2]
+RESULTS = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
+CELLS = study_cells()
+
+
+def shipped() -> bool:
+    """Whether there is any cell; without one there is nothing to check the sums of."""
+    return any((RESULTS.results / "cells").glob("*.parquet"))
+
+
+def test_files_have_their_checksums_and_are_of_this_study() -> None:
+    wrong = [finding for finding in [*check_sums(RESULTS), *check_cells(CELLS, RESULTS)] if not finding.ok]
+    if not shipped():
+        assert [finding.message for finding in wrong] == ["0 of 0 files have their checksums"]
+        return
+    assert wrong == []
+
+
+def test_no_foreign_cell_is_shipped() -> None:
+    planned = {cell.id for cell in CELLS}
+    assert {path.stem for path in (RESULTS.results / "cells").glob("*.parquet")} <= planned
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("algorithm", "family"), columns(CELLS))
+def test_the_engine_repeats_two_epochs(
+    algorithm: str, family: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finding = check_column(CELLS, RESULTS, algorithm, family, epochs=2)
+    with capsys.disabled():
+        print(f"\n{finding.subject}: {finding.message}")
+    assert finding.ok, (
+        f"{finding.message}. If the change is meant: raise STUDY_VERSION, name it in the CHANGELOG"
+    )
+    finished = any(
+        RESULTS.state(cell) == "finished"
+        for cell in CELLS
+        if (cell.algorithm, cell.family) == (algorithm, family)
+    )
+    assert (finding.message == NOTHING_TO_RERUN) is not finished
+
+
+def test_the_changelog_names_every_later_version_of_the_study() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf8")
+    for version in range(2, STUDY_VERSION + 1):
+        assert f"study version {version}" in changelog
