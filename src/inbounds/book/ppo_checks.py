@@ -1,0 +1,237 @@
+"""What PPO's loss must do, as named checks: each looks at one thing, and says in words what is wrong with it.
+
+They see a loss from outside, as a function of two networks and a minibatch, by its value and its gradients:
+`inbounds.book.graders_ppo` runs them on what readers write, in the order of `CHECKS`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from types import MappingProxyType, SimpleNamespace
+from typing import NamedTuple, TypeAlias
+
+import torch
+from torch import Tensor, nn
+
+from inbounds.learning.laws import NORMAL, Limits
+from inbounds.learning.policies import normal_entropy
+
+__all__ = ["CHECKS", "GAUSSIAN", "Law", "Loss", "Scene", "policy_loss"]
+
+OBS, ACT, STEPS = 3, 2, 64
+EPSILON = 0.2
+
+Loss: TypeAlias = Callable[..., Tensor]
+"""``loss(actor, critic, batch, law, clip_range, entropy_coef, value_coef)``."""
+Check: TypeAlias = Callable[[Loss], "str | None"]
+"""Returns what is wrong, or None."""
+
+
+class Law(NamedTuple):
+    """What PPO asks of a policy family: the chapter's `Law`."""
+
+    log_prob: Callable[[Tensor, Tensor], Tensor]
+    """Outputs `[B, 2A]` and latents `[B, A]` to `[B]`."""
+    entropy: Callable[[Tensor], Tensor]
+    """Outputs `[B, 2A]` to `[B]`."""
+
+
+GAUSSIAN = Law(
+    lambda outputs, latent: NORMAL.log_prob(NORMAL.parameters(outputs, Limits()), latent),
+    lambda outputs: normal_entropy(NORMAL.parameters(outputs, Limits())),
+)
+
+
+@dataclasses.dataclass
+class Scene:
+    """Two small networks, and steps that the policy drew."""
+
+    actor: nn.Sequential
+    critic: nn.Sequential
+    batch: SimpleNamespace
+
+    @classmethod
+    def of(cls, seed: int) -> Scene:
+        """Return a scene of its own for each seed, in float64; σ is about 1.3, so that many latents leave [−1, 1]."""
+        generator = torch.Generator().manual_seed(seed)
+
+        def randn(*shape: int) -> Tensor:
+            return torch.randn(*shape, generator=generator, dtype=torch.float64)
+
+        actor, critic = (
+            nn.Sequential(nn.Linear(OBS, 8), nn.Tanh(), nn.Linear(8, size)).double() for size in (2 * ACT, 1)
+        )
+        for tensor in (*actor.parameters(), *critic.parameters()):
+            nn.init.normal_(tensor, std=0.4, generator=generator)
+        actor[2].bias.data[ACT:] += 0.3  # type: ignore[operator, index]
+        obs = randn(STEPS, OBS)
+        with torch.no_grad():
+            loc, log_scale = actor(obs).chunk(2, -1)
+            latent = loc + log_scale.exp() * randn(STEPS, ACT)
+            log_prob = GAUSSIAN.log_prob(actor(obs), latent)
+        batch = SimpleNamespace(
+            obs=obs, latent=latent, log_prob=log_prob, advantage=randn(STEPS) + 0.2, return_=3 * randn(STEPS)
+        )
+        return cls(actor, critic, batch)
+
+    def with_ratios(self, ratio: Tensor) -> Scene:
+        """Change the stored log-probabilities so that the present policy has these ratios."""
+        changed = SimpleNamespace(**vars(self.batch) | {"log_prob": self.batch.log_prob - ratio.log()})
+        return dataclasses.replace(self, batch=changed)
+
+    def with_advantages(self, advantage: Tensor) -> Scene:
+        """Change the advantages."""
+        return dataclasses.replace(self, batch=SimpleNamespace(**vars(self.batch) | {"advantage": advantage}))
+
+    def gradients(self, loss: Tensor) -> tuple[Tensor, Tensor]:
+        """The gradients for the policy and for the critic, a vector each; zero where the loss does not depend on it."""
+
+        def gradient(network: nn.Sequential) -> Tensor:
+            parameters = list(network.parameters())
+            found = torch.autograd.grad(
+                loss, parameters, allow_unused=True, retain_graph=True, materialize_grads=True
+            )
+            return torch.cat([each.flatten() for each in found])
+
+        return gradient(self.actor), gradient(self.critic)
+
+    def weighted_score(self, weights: Tensor) -> Tensor:
+        """−mean(weights ∇log π), what a loss's gradient for the policy should be."""
+        log_prob = GAUSSIAN.log_prob(self.actor(self.batch.obs), self.batch.latent)
+        return self.gradients(-(weights * log_prob).mean())[0]
+
+
+def _close(a: Tensor, b: Tensor) -> bool:
+    return a.shape == b.shape and torch.allclose(a, b, rtol=1e-6, atol=1e-9)
+
+
+def policy_loss(function: Loss, scene: Scene) -> Tensor:
+    """Return a loss without entropy and without values."""
+    return function(scene.actor, scene.critic, scene.batch, GAUSSIAN, EPSILON, 0.0, 0.0)
+
+
+def _starts_at_one(function: Loss) -> str | None:
+    scene = Scene.of(1)
+    value = policy_loss(function, scene).detach()
+    mean = scene.batch.advantage.mean()
+    if value.shape != ():
+        return f"the loss must be one number, got the shape {list(value.shape)}"
+    if _close(value, -mean):
+        return None
+    if _close(value, mean):
+        return "it has the wrong sign: Adam goes downhill, so the loss is minus the surrogate"
+    if _close(value, -scene.batch.advantage.sum()):
+        return "that is a sum over the minibatch; take the mean"
+    return (
+        "the policy has not moved, so every ratio is 1 and the loss must be minus the mean advantage. Are the latents "
+        "scored as they were drawn, and summed over the action's dimensions?"
+    )
+
+
+def _weighs_by_the_ratio(function: Loss) -> str | None:
+    scene = Scene.of(2)
+    ratio = torch.linspace(0.85, 1.15, STEPS, dtype=torch.float64)
+    moved = scene.with_ratios(ratio)
+    gradient = moved.gradients(policy_loss(function, moved))[0]
+    if _close(gradient, moved.weighted_score(ratio * moved.batch.advantage)):
+        return None
+    if _close(gradient, moved.weighted_score(moved.batch.advantage)):
+        return (
+            "the ratio is 1 whatever the policy has done since: divide by the density that *drew* the latent, which is "
+            "stored"
+        )
+    return "inside 1 ± ε the gradient must be minus the mean of r Â ∇log π"
+
+
+def _leaves_the_way_back_open(function: Loss) -> str | None:
+    scene = Scene.of(3)
+    ratio = torch.linspace(0.3, 0.7, STEPS, dtype=torch.float64)
+    moved = scene.with_ratios(ratio).with_advantages(scene.batch.advantage.abs() + 0.1)
+    gradient = moved.gradients(policy_loss(function, moved))[0]
+    if _close(gradient, moved.weighted_score(ratio * moved.batch.advantage)):
+        return None
+    if not gradient.any():
+        return (
+            "actions that were better than expected have become *less* likely, r < 1 − ε, and the loss does not bring "
+            "them back: clip the gain, not the loss of it"
+        )
+    return "for Â > 0 and r < 1 − ε the clip has no say: the gradient must be minus the mean of r Â ∇log π"
+
+
+def _knows_bad_actions(function: Loss) -> str | None:
+    scene = Scene.of(4)
+    advantage = -scene.batch.advantage.abs() - 0.1
+    for low, high, alive in ((1.3, 1.7, True), (0.3, 0.7, False)):
+        ratio = torch.linspace(low, high, STEPS, dtype=torch.float64)
+        moved = scene.with_ratios(ratio).with_advantages(advantage)
+        gradient = moved.gradients(policy_loss(function, moved))[0]
+        wanted = moved.weighted_score(ratio * advantage)
+        if not _close(gradient, wanted if alive else 0 * wanted):
+            where = "r > 1 + ε must still be pushed down" if alive else "r < 1 − ε must be left alone"
+            return (
+                f"of the actions that were worse than expected, those with {where}: multiply by Â *before* you take "
+                "the minimum"
+            )
+    return None
+
+
+def _stops_paying(function: Loss) -> str | None:
+    scene = Scene.of(5)
+    ratio = torch.linspace(1.3, 1.7, STEPS, dtype=torch.float64)
+    moved = scene.with_ratios(ratio).with_advantages(scene.batch.advantage.abs() + 0.1)
+    gradient = moved.gradients(policy_loss(function, moved))[0]
+    if gradient.any():
+        return "for Â > 0 and r > 1 + ε the surrogate is flat: nothing may push these ratios further up"
+    return None
+
+
+def _teaches_the_critic(function: Loss) -> str | None:
+    scene = Scene.of(6)
+    if scene.gradients(policy_loss(function, scene))[1].any():
+        return "the surrogate moves the critic: the advantages are constants"
+    loss = function(scene.actor, scene.critic, scene.batch, GAUSSIAN, EPSILON, 0.0, 0.5)
+    gradient = scene.gradients(loss)
+    prediction = scene.critic(scene.batch.obs)[:, 0]
+    right = scene.gradients(0.5 * (prediction - scene.batch.return_).square().mean())[1]
+    spread = scene.gradients(0.5 * (prediction[:, None] - scene.batch.return_).square().mean())[1]
+    if _close(gradient[1], spread):
+        return (
+            "[B, 1] minus [B] is [B, B]: every value is compared with every return, and the critic learns their mean. "
+            "Drop the last axis of the critic's output"
+        )
+    if not _close(gradient[1], right):
+        return "the critic's gradient must be that of value_coef times the mean of (V − R)²"
+    if not _close(gradient[0], scene.gradients(policy_loss(function, scene))[0]):
+        return "the value loss moves the policy"
+    return None
+
+
+def _pays_for_entropy(function: Loss) -> str | None:
+    scene = Scene.of(7)
+    still = scene.with_advantages(0 * scene.batch.advantage)
+    gradient = still.gradients(function(still.actor, still.critic, still.batch, GAUSSIAN, EPSILON, 0.1, 0.0))[
+        0
+    ]
+    right = still.gradients(-0.1 * GAUSSIAN.entropy(still.actor(still.batch.obs)).mean())[0]
+    if _close(gradient, right):
+        return None
+    if _close(gradient, -right):
+        return "the bonus has the wrong sign: the loss must fall when the entropy rises"
+    return (
+        "with no advantage, the policy's gradient must be minus entropy_coef times that of the mean entropy"
+    )
+
+
+CHECKS: Mapping[str, Check] = MappingProxyType(
+    {
+        "starts at one": _starts_at_one,
+        "weighs by the ratio": _weighs_by_the_ratio,
+        "leaves the way back open": _leaves_the_way_back_open,
+        "knows bad actions": _knows_bad_actions,
+        "stops paying": _stops_paying,
+        "teaches the critic": _teaches_the_critic,
+        "pays for entropy": _pays_for_entropy,
+    }
+)
+"""Name → check of a loss, in the order in which they run."""
