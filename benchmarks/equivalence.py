@@ -13,17 +13,20 @@ from scipy.optimize import brentq
 def area(returns: ArrayLike) -> NDArray[np.float64]:
     """Return the area under learning curves per epoch: the mean over epochs, `[...]`, of `[..., epochs]`.
 
-    An epoch in which no episode ended (NaN) counts as the one before it; before the first that ended, not at all.
+    An epoch in which no episode ended (NaN) counts as the one before it; before the first that ended, not at all. A
+    curve that ends in NaN has no area: the run diverged or was cut short, and its last return says nothing of the rest.
 
     Example:
-        >>> area([[np.nan, 1.0, np.nan, 4.0]]).tolist()  # of 1, 1 and 4
-        [2.0]
+        >>> area([[np.nan, 1.0, np.nan, 4.0], [1.0, 2.0, 3.0, np.nan]]).tolist()  # of 1, 1 and 4
+        [2.0, nan]
     """
     curves = np.array(returns, float)
+    curves[np.isnan(curves[..., -1])] = np.nan
     for epoch in range(1, curves.shape[-1]):
         missing = np.isnan(curves[..., epoch])
         curves[..., epoch] = np.where(missing, curves[..., epoch - 1], curves[..., epoch])
-    return np.nanmean(curves, -1)
+    known = ~np.isnan(curves)
+    return np.where(known, curves, 0).sum(-1) / np.where(known.any(-1), known.sum(-1), np.nan)
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,8 @@ def equivalence(ours: ArrayLike, theirs: ArrayLike, margin: float = 0.15, level:
         Ratio, interval, p-value, verdict.
 
     Raises:
-        ValueError: fewer than two seeds, or a peer's mean that is not significantly above zero.
+        ValueError: fewer than two seeds, a seed without an area, or a peer's mean that is not significantly above
+            zero.
 
     Example:
         >>> outcome = equivalence([100, 102, 98, 101], [99, 101, 100, 102])
@@ -91,6 +95,10 @@ def equivalence(ours: ArrayLike, theirs: ArrayLike, margin: float = 0.15, level:
     a, b = np.asarray(ours, float), np.asarray(theirs, float)
     if min(len(a), len(b)) < 2:
         raise ValueError(f"at least two seeds a side are needed, got {len(a)} and {len(b)}: train more")
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise ValueError(
+            "a seed diverged or was cut short, and has no area: train it to the end, or leave it out"
+        )
     if not stats.ttest_1samp(b, 0, alternative="greater").pvalue < level:
         raise ValueError(
             f"the peer's mean {b.mean():.4g} is not clearly above zero, and a share of it means nothing: train longer"

@@ -59,6 +59,17 @@ def test_epochs_without_an_episode_do_not_count_as_bad_ones() -> None:
     assert area([[nan, 2.0, nan, nan, 6.0], [1.0, 1.0, 1.0, 1.0, 1.0]]).tolist() == [3.0, 1.0]
 
 
+def test_a_curve_that_ends_without_a_return_has_no_area() -> None:
+    nan = np.nan
+    areas = area([[1.0, 2.0, nan], [nan, nan, nan], [2.0, nan, 4.0]])
+    assert np.array_equal(areas, [nan, nan, 8 / 3], equal_nan=True)
+    assert np.isnan(area([[[1.0, nan]]])).shape == (1, 1)
+    with pytest.raises(ValueError, match="diverged or was cut short"):
+        equivalence(areas, [2.0, 2.1, 2.2])
+    with pytest.raises(ValueError, match="diverged or was cut short"):
+        equivalence([2.0, 2.1, 2.2], areas)
+
+
 @pytest.mark.slow
 def test_a_quick_validation_judges_and_is_not_run_twice(tmp_path, capsys, monkeypatch) -> None:
     validate.main(["--quick", "--output", str(tmp_path), "--workers", "1"])

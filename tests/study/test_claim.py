@@ -5,10 +5,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from inbounds.study import claim
 from inbounds.study.claim import FILE_NAME, SILENCE, Claim, ClaimedError, is_alive, read_claim, whoami
 
 HOLD = """
@@ -19,6 +22,15 @@ Claim.take(Path(sys.argv[1]))
 print("taken", flush=True)
 sys.stdin.read()
 os._exit(9)
+"""
+
+LOCK = """
+import sys
+from pathlib import Path
+from inbounds.study.claim import file_lock
+with file_lock(Path(sys.argv[1], ".guard")):
+    print("locked", flush=True)
+    sys.stdin.read()
 """
 
 
@@ -55,12 +67,12 @@ def test_another_host_is_believed_for_a_while(tmp_path: Path) -> None:
 
 
 def test_who_was_taken_over_notices_and_leaves_the_new_holder_alone(tmp_path: Path) -> None:
-    claim = Claim.take(tmp_path)
+    ours = Claim.take(tmp_path)
     write(tmp_path, host="elsewhere", pid=1)
-    for act in (claim.check, claim.renew):
+    for act in (ours.check, ours.renew):
         with pytest.raises(ClaimedError, match="taken over by another process"):
             act()
-    claim.release()
+    ours.release()
     assert read_claim(tmp_path)["host"] == "elsewhere"  # type: ignore[index]
 
 
@@ -71,9 +83,17 @@ def test_a_file_cut_short_claims_nothing(tmp_path: Path, text: str) -> None:
     Claim.take(tmp_path).release()
 
 
-def test_of_many_exactly_one_takes_over(tmp_path: Path) -> None:
+def test_of_many_exactly_one_takes_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path, pid=2**22 + 1)  # above the kernel's largest
-    start, taken = threading.Barrier(8), []
+    start, taken, real = threading.Barrier(8), [], is_alive
+
+    def look(holder: Mapping[str, Any]) -> bool:
+        """Look, and dawdle: whoever else looks now sees the same dead holder, unless it has to wait."""
+        alive = real(holder)
+        time.sleep(0.05)
+        return alive
+
+    monkeypatch.setattr(claim, "is_alive", look)
 
     def take() -> None:
         start.wait()
@@ -86,6 +106,24 @@ def test_of_many_exactly_one_takes_over(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert len(taken) == 1
+
+
+def test_a_claim_waits_for_whoever_holds_the_lock(tmp_path: Path) -> None:
+    holder = subprocess.Popen(
+        [sys.executable, "-c", LOCK, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "locked\n"
+        taker = threading.Thread(target=Claim.take, args=(tmp_path,))
+        taker.start()
+        taker.join(0.3)
+        assert taker.is_alive()
+        assert read_claim(tmp_path) is None
+        holder.kill()  # the kernel drops the lock of the dead
+        taker.join(30)
+        assert not taker.is_alive()
+    assert read_claim(tmp_path) is not None
 
 
 def test_we_are_alive() -> None:

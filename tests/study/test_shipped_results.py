@@ -1,7 +1,7 @@
 """The shipped results are what they say, and the engine still gives them: a change that alters them fails here.
 
 On the processor and with the wheels of a cell's run its first two epochs must be repeated exactly; elsewhere the
-rewards of the first steps are compared (`inbounds.study.verify`), and the golden runs of the engine's own tests stand in.
+rewards of the first steps are compared (`inbounds.study.verify`), and the engine's own golden runs stand in.
 """
 
 from pathlib import Path

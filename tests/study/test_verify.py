@@ -1,5 +1,7 @@
 import json
 import shutil
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -71,6 +73,24 @@ def test_checksums_are_what_sha256sum_reads(folder: StudyFolder) -> None:
             f"policies/{CELL.id}.safetensors",
         )
     ]
+
+
+def test_sums_written_at_the_same_time_are_all_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, real = folder_in(tmp_path), StudyFolder.checksums
+
+    def dawdle(self: StudyFolder) -> dict[str, str]:
+        sums = real(self)
+        time.sleep(0.05)  # whoever else reads now sees the same list, unless it has to wait
+        return sums
+
+    monkeypatch.setattr(StudyFolder, "checksums", dawdle)
+    paths = [folder.results / "cells" / f"{i}.parquet" for i in range(6)]
+    threads = [threading.Thread(target=folder.publish, args=({path: b"rows"},)) for path in paths]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert set(real(folder)) == {f"cells/{i}.parquet" for i in range(6)}
 
 
 def test_a_changed_byte_a_missing_and_a_foreign_file_are_found(folder: StudyFolder) -> None:
