@@ -1,0 +1,128 @@
+"""What each detail costs that the source thesis leaves out: the study's fourth arm, a table that fills as cells finish.
+
+::
+
+    from inbounds.book.ppo_details import what_details_cost
+
+    what_details_cost("../results")
+
+A cell that has not been run says so. The table's plain text is the same whatever is there, so that a stored notebook
+stays a faithful record while the study goes on.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from inbounds.book.figures import FAMILIES
+from inbounds.study import StudyFolder, analysis
+from inbounds.study.grid import ARMS
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.statistics import Estimate
+
+__all__ = ["DETAILS", "CostTable", "what_details_cost"]
+
+DETAILS: Mapping[str, str] = MappingProxyType(
+    {
+        "printed-clip": "clip range 0.02",
+        "printed-observations": "observations not normalised",
+        "printed-advantages": "advantages not normalised",
+        "printed-gradients": "gradients not clipped",
+        "printed-weights": "PyTorch's initial weights",
+        "entropy-0": "no entropy bonus",
+        "entropy-0.001": "entropy coefficient 1e-3",
+        "entropy-0.01": "entropy coefficient 1e-2",
+    }
+)
+"""Variant of the study → what is changed in the preset `common`, and nothing else."""
+
+NOT_RUN, NOT_PLANNED = "not yet run", "–"
+
+
+@dataclass(frozen=True)
+class CostTable:
+    """Changes of the final return, by detail and column; a notebook shows it as a table."""
+
+    columns: Sequence[tuple[str, str]]
+    """Robot and family."""
+    rows: Mapping[str, Sequence[str]]
+    """Detail, in words → a cell for each column."""
+
+    def __repr__(self) -> str:
+        return f"<table: {len(self.rows)} details, {len(self.columns)} columns of robot and family>"
+
+    def _repr_html_(self) -> str:
+        heads = "".join(
+            f"<th scope='col'>{robot}, {FAMILIES[family].label}</th>" for robot, family in self.columns
+        )
+        body = "".join(
+            f"<tr><th scope='row'>{html.escape(detail)}</th>"
+            + "".join(f"<td>{cell}</td>" for cell in cells)
+            + "</tr>"
+            for detail, cells in self.rows.items()
+        )
+        caption = (
+            "Change of the mean final return over ten seeds when one detail of <code>common</code> is changed, "
+            "with a 95 % bootstrap interval"
+        )
+        return (
+            f'<div style="overflow-x:auto"><table class="table"><caption>{caption}</caption>'
+            f"<thead><tr><th scope='col'>changed</th>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
+        )
+
+
+def what_details_cost(results: str | Path | Outcomes) -> CostTable:
+    """Return the table of `DETAILS`, on the robots and families on which the study varies them.
+
+    Args:
+        results: the study's folder of results, or what has been read from it.
+
+    Example:
+        >>> table = what_details_cost("no/results")
+        >>> table
+        <table: 8 details, 6 columns of robot and family>
+        >>> set(table.rows["clip range 0.02"])
+        {'not yet run', '–'}
+    """
+    planned = [cell for cell in ARMS["mechanisms"] if cell.variant in DETAILS]
+    if not isinstance(results, Outcomes):
+        compared = {(cell.algorithm, cell.family, cell.robot) for cell in planned}
+        plain = [c for c in ARMS["standard"] if (c.algorithm, c.family, c.robot) in compared]
+        results = Outcomes.read(StudyFolder(Path(results)), [*planned, *plain])
+    columns = [
+        (robot, family)
+        for robot in dict.fromkeys(cell.robot for cell in planned)
+        for family in FAMILIES
+        if any(cell.family == family for cell in planned)
+    ]
+    rows = {
+        words: [_cell(results, variant, robot, family) for robot, family in columns]
+        for variant, words in DETAILS.items()
+    }
+    return CostTable(columns, rows)
+
+
+def _cell(outcomes: Outcomes, variant: str, robot: str, family: str) -> str:
+    plan = ((c.variant, c.robot, c.family) for c in ARMS["mechanisms"])
+    if (variant, robot, family) not in plan:
+        return NOT_PLANNED
+    outcome = outcomes.find(Column("mechanisms", "ppo", family, variant), robot)
+    change = analysis.change(outcomes, outcome, "final") if outcome else None
+    return spoken(change) if change else NOT_RUN
+
+
+def spoken(change: Estimate) -> str:
+    """Say a change with its interval.
+
+    Example:
+        >>> import numpy as np
+        >>> spoken(Estimate(np.array(-12.4), np.array(-30.6), np.array(5.0), 10, 0, 0.95, "difference"))
+        '−12 [−31, 5]'
+    """
+    value, low, high = (f"{float(x):.0f}".replace("-", "−") for x in (change.value, change.low, change.high))
+    diverged = f", {change.diverged} diverged" if change.diverged else ""
+    return f"{value} [{low}, {high}]{diverged}"
