@@ -143,7 +143,7 @@ def differences(
         without_diverged: leave out seeds that diverged.
 
     Returns:
-        By robot, all six: where a cell is missing, a comparison without a difference.
+        A comparison for each of the six robots; where a cell is missing, one without a difference.
     """
     first, second = (_scores_by_robot(outcomes, c, endpoint, without_diverged) for c in contrast.columns)
     rng = generator_for("difference", *contrast, endpoint, without_diverged)

@@ -115,11 +115,11 @@ def probability_of_improvement(
 ) -> Estimate:
     """Estimate P(first > second) + ½ P(first = second) for a random run of each, averaged over environments.
 
-    Agarwal et al. (2021, section 4), with their stratified bootstrap interval. For one environment it is the
-    Mann–Whitney U over the number of pairs, and its interval is method 5 of Newcombe (2006, part 2), a score interval
-    that stays honest near 0 and 1: where one policy wins every comparison, a bootstrap has nothing to resample and
-    its interval no width. Where that happens on all of several environments, Newcombe's interval for one of them (the
-    one with the fewest seeds) is given, which is too wide rather than too narrow.
+    Agarwal et al. (2021, section 4.3), with their stratified bootstrap interval. For one environment it is the
+    Mann–Whitney U over the number of pairs, and its interval is the score interval that Newcombe (2006, part 2)
+    recommends, which stays honest near 0 and 1: where one policy wins every comparison, a bootstrap has nothing to
+    resample and its interval no width. Where that happens on all of several environments, Newcombe's interval for one
+    of them (the one with the fewest seeds) is given, which is too wide rather than too narrow.
 
     It says how often, not by how much.
 
