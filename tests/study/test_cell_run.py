@@ -16,11 +16,12 @@ import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer, checkpoint
 from inbounds.learning.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
-from inbounds.study import Cell, StudyError, StudyFolder, evaluate, read_cell, run_cell
+from inbounds.study import Cell, StudyError, StudyFolder, cell_run, evaluate, read_cell, run_cell
 from inbounds.study.cell_run import DiskFullError
 from inbounds.study.claim import Claim, ClaimedError
 from inbounds.study.evaluate import generator_of
 from inbounds.study.measure import MeasuredTrainer
+from inbounds.study.provenance import provenance
 from inbounds.study.store import COLUMNS, EVERY_EPOCH, MEASURED, read_metadata, table_of
 from inbounds.study.verify import first_mismatch
 from tests.study.small import folder_in, small_cell, stop_after
@@ -168,6 +169,16 @@ def test_stopping_and_going_on_changes_nothing(tmp_path: Path, whole: pa.Table) 
     sessions = read_metadata(folder.cell_file(small_cell()))["sessions"]
     assert [session["from_epoch"] for session in sessions] == [0, 3, 12, 13]
     assert not list(folder.work.glob("**/checkpoint.pt"))
+
+
+def test_going_on_with_another_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, cell = folder_in(tmp_path), small_cell(epochs=3)
+    run_cell(cell, folder, stop=stop_after(1))
+    monkeypatch.setattr(cell_run, "provenance", lambda: provenance() | {"engine": "other"})
+    with pytest.warns(UserWarning, match=r"source has changed since the last checkpoint.*start it anew"):
+        run_cell(cell, folder)
+    sessions = read_metadata(folder.cell_file(cell))["sessions"]
+    assert [session["engine"] == "other" for session in sessions] == [False, True]
 
 
 def test_time_that_is_up_stops_with_a_checkpoint(tmp_path: Path) -> None:

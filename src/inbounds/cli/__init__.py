@@ -29,7 +29,7 @@ EXAMPLES = {
   inbounds study status
   inbounds study run standard --nice 19 --max-minutes 60
   inbounds study run --scheduler tcp://host:8786      (on a Dask cluster; see `inbounds.study.cluster`)
-  inbounds study report --out study-report.html
+  inbounds study report --out report.html
   inbounds study verify --random 2 --epochs 20""",
 }
 

@@ -69,7 +69,7 @@ class Status(_Where):
 class Report(_Where):
     """Write an HTML page of figures and tables of all finished cells; what is missing is called missing."""
 
-    out: Path = Path("study-report.html")
+    out: Path = Path("runs/study-report.html")
     """The file; it needs no other."""
 
 
