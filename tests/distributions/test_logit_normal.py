@@ -174,6 +174,29 @@ def test_moments_against_mpmath(loc: float, log_scale: float) -> None:
     assert float(ours.entropy()) == pytest.approx(entropy, rel=1e-13, abs=1e-13)
 
 
+@few
+@given(floats(-6, 6), floats(-2, 1))
+def test_mean_satisfies_its_recurrence(loc: float, log_scale: float) -> None:
+    """m(μ) = 1 − exp(σ²/2 − μ) m(μ − σ²), and Var = m(1 − m) − m'(μ), on the unit interval (Pirjol 2013)."""
+    variance = math.exp(2 * log_scale)
+    location, scale = double(loc, math.exp(log_scale))
+    shifted = LogitNormal(location - variance, scale).mean
+    mean = LogitNormal(location.requires_grad_(), scale).mean
+    (slope,) = torch.autograd.grad(mean, location)
+    mean = mean.detach()
+    assert float(mean) == pytest.approx(1 - math.exp(variance / 2 - loc) * float(shifted), abs=1e-9)
+    law = LogitNormal(location.detach(), scale)
+    assert float(law.variance) == pytest.approx(float(mean * (1 - mean) - slope), abs=1e-12)
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, math.e])
+def test_mean_is_a_finite_sum_at_multiples_of_the_variance(scale: float) -> None:
+    for k in range(6):
+        terms = [(-1) ** j * math.exp(-(scale**2) * (j * k - j**2 / 2)) for j in range(k)]
+        exact = sum(terms) + 0.5 * (-1) ** k * math.exp(-(scale**2) * k**2 / 2)
+        assert float(LogitNormal(*double(k * scale**2, scale)).mean) == pytest.approx(exact, abs=1e-12)
+
+
 @pytest.mark.parametrize(("loc", "scale"), [(0.7, 1e6), (-1e5, 1e6), (0.0, 1e-8), (40.0, 1.0)])
 def test_moments_at_extreme_parameters(loc: float, scale: float) -> None:
     """A very wide law is a coin on the two bounds; a very narrow one a Normal with the sigmoid's slope."""

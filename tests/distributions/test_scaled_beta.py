@@ -9,7 +9,7 @@ import scipy.integrate
 import scipy.special
 import scipy.stats
 import torch
-from hypothesis import given
+from hypothesis import assume, given
 from torch.distributions import Beta, kl_divergence
 
 from inbounds.distributions import ScaledBeta
@@ -224,3 +224,51 @@ def test_latents_have_the_laws_moments() -> None:
     variance = scipy.special.polygamma(1, 0.3) + scipy.special.polygamma(1, 2.0)
     assert float(latent.mean()) == pytest.approx(mean, abs=4 * math.sqrt(variance / 20000))
     assert float(latent.var()) == pytest.approx(variance, rel=0.06)
+
+
+@few
+@given(floats(1, 80), floats(1, 80), intervals())
+def test_a_cap_is_a_floor_under_the_variance(alpha: float, beta: float, bounds: tuple[float, float]) -> None:
+    """With 1 ≤ α, β ≤ c: c/((c + 1)²(c + 2)) ≤ Var/L² ≤ 1/12, attained at (c, 1) and (1, 1)."""
+    low, high = bounds
+
+    def relative_variance(a: float, b: float) -> float:
+        law = ScaledBeta(*double(a, b), low, high)
+        return float(law.variance / law.width.square())
+
+    floor = 80 / (81**2 * 82)
+    assert floor * (1 - 1e-9) <= relative_variance(alpha, beta) <= (1 + 1e-9) / 12
+    assert relative_variance(80, 1) == relatively(floor, rel=1e-9)
+    assert relative_variance(1, 1) == relatively(1 / 12, rel=1e-9)
+
+
+@few
+@given(floats(0.01, 0.99), floats(0.01, 0.99))
+def test_means_and_variances_within_reach(mean: float, share: float) -> None:
+    """α = mν, β = (1 − m)ν with ν = m(1 − m)/v − 1; both in [1, c] exactly between the stated variances."""
+    variance = share * mean * (1 - mean)
+    total = mean * (1 - mean) / variance - 1
+    law = ScaledBeta(*double(mean * total, (1 - mean) * total))
+    assert float(law.mean) == relatively(mean, rel=1e-9)
+    assert float(law.variance) == relatively(variance, rel=1e-9)
+    near, far = min(mean, 1 - mean), max(mean, 1 - mean)
+    smaller, larger = sorted([float(law.concentration1), float(law.concentration0)])
+    assume(not math.isclose(smaller, 1, rel_tol=1e-6) and not math.isclose(larger, 80, rel_tol=1e-6))
+    assert (smaller > 1) == (variance < near**2 * far / (1 + near))
+    assert (larger < 80) == (variance > near * far**2 / (80 + far))
+
+
+@few
+@given(floats(0, 1), floats(0.01, 70))
+def test_entropy_falls_with_the_concentration(omega: float, concentration: float) -> None:
+    """H = log L − KL(p‖uniform): it falls along κ at a fixed mode, with the gradient −I(η)(η − 1)."""
+    law, uniform = ScaledBeta.from_mode(*double(omega, concentration)), ScaledBeta(*double(1.0, 1.0))
+    assert float(law.entropy()) == pytest.approx(-float(kl_divergence(law, uniform)), abs=1e-10)
+    assert law.entropy() < ScaledBeta.from_mode(*double(omega, 0.9 * concentration)).entropy()
+    alpha, beta = (x.clone().requires_grad_() for x in (law.concentration1, law.concentration0))
+    slopes = torch.autograd.grad(ScaledBeta(alpha, beta).entropy(), (alpha, beta))
+    a, b = float(law.concentration1), float(law.concentration0)
+    both = scipy.special.polygamma(1, a + b) * (a + b - 2)
+    for slope, x in zip(slopes, (a, b), strict=True):
+        expected = both - scipy.special.polygamma(1, x) * (x - 1)
+        assert float(slope) == pytest.approx(expected, rel=1e-6, abs=1e-12)
