@@ -168,7 +168,7 @@ def test_the_curves_of_both_sides_are_drawn(tmp_path: Path, on_page: list) -> No
     found = validation(tmp_path)
     verdicts = {"Hopper-v5": found["verdicts"]["Hopper-v5"]}
     assert speed.show_validation({**found, "verdicts": verdicts}) is None
-    ((data, metadata),) = on_page
+    ((_, metadata),) = on_page
     assert "stable-baselines3" in metadata["image/png"]["alt"]
 
 
