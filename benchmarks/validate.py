@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from rich.console import Console
@@ -189,7 +190,7 @@ def run_jobs(todo: Sequence[Job], workers: int, console: Console) -> None:
 
 def curves(table: pa.Table, env: str, who: str) -> NDArray[np.float64]:
     """Return the returns `[seeds, epochs]` of one side on one robot."""
-    rows = table.filter((pa.compute.field("env") == env) & (pa.compute.field("who") == who)).sort_by(
+    rows = table.filter((pc.field("env") == env) & (pc.field("who") == who)).sort_by(
         [("seed", "ascending"), ("env_steps", "ascending")]
     )
     return rows["return_mean"].to_numpy().reshape(len(rows["seed"].unique()), -1)
@@ -220,7 +221,7 @@ def plot(table: pa.Table, verdicts: dict[str, Any]) -> tuple[Any, str]:
     fig, axes = plt.subplots(1, len(verdicts), figsize=(figures.WIDTH, 3.4), squeeze=False)
     looks = {OURS: (figures.SHADES[0], "-", "In Bounds"), PEER: (figures.SHADES[3], "--", PEER)}
     for ax, env in zip(axes[0], verdicts, strict=True):
-        steps = np.unique(table.filter(pa.compute.field("env") == env)["env_steps"].to_numpy())
+        steps = np.unique(table.filter(pc.field("env") == env)["env_steps"].to_numpy())
         for who, (color, linestyle, label) in looks.items():
             returns = curves(table, env, who)
             middle, count = np.nanmean(returns, 0), len(returns)
