@@ -4,7 +4,7 @@ With z ~ N(μ, σ²), the value is a = low + (high − low) · sigmoid(z). By ch
 
 $$ p(a) = N(z; μ, σ²) · |dz/da|,  z = log((a − low)/(high − a)),  dz/da = (high − low)/((a − low)(high − a)), $$
 
-Johnson's S_B distribution (Johnson 1949; Atchison & Shen 1980), here with location, scale and bounds. On
+Johnson's S_B distribution (Johnson 1949; Aitchison & Shen 1980), here with location, scale and bounds. On
 [−1, 1] it is the law of tanh(x) with x ~ N(μ/2, σ²/4): the squashed Gaussian of soft actor-critic (Haarnoja et
 al. 2018, appendix C). KL divergence, density ratio and score are those of the latent Normals, because all three
 are invariant under a bijection.

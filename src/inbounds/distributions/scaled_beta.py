@@ -135,7 +135,7 @@ class ScaledBeta(SigmoidMapped):
     def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """Return logits z = log G₁ − log G₀, `[*sample_shape, ...]`, with G₁ ~ Gamma(α) and G₀ ~ Gamma(β).
 
-        Each log G is log Gamma(α + 1) + log(U)/α with U uniform (Marsaglia & Tsang 2000, section 6): it stays finite
+        Each log G is log Gamma(α + 1) + log(U)/α with U uniform (Marsaglia & Tsang 2000, for α < 1): it stays finite
         for the smallest α. Differentiable once in the concentrations (implicitly, through torch's Gamma sampler).
         """
         shape = self._extended_shape(torch.Size(sample_shape))
