@@ -17,8 +17,6 @@ import sys
 import time
 from pathlib import Path
 
-import student_copies
-
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "_build"
 INDEX = BUILD / "html" / "index.html"
@@ -95,6 +93,8 @@ def main() -> int:
                 file=sys.stderr,
             )
             return status
+        import student_copies  # not above: it takes a second, and mostly nothing changed
+
         student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
         STAMP.write_text(everything)
         print(f"Built in {time.perf_counter() - start:.0f} s.")
