@@ -82,41 +82,41 @@ def test_the_circumstances_are_told(results: Any) -> None:
         assert words in html
 
 
-def test_what_was_not_measured_is_called_missing(tmp_path: Path) -> None:
-    assert speed.read_speed(tmp_path) is None
-    assert speed.read_validation(tmp_path) is None
-    for shown in (
-        speed.ratio_table(None),
-        speed.rate_table(None),
-        speed.how_measured(None),
-        speed.show_speed(None),
-    ):
-        assert shown is not None
-        assert "<code>make bench</code>" in shown._repr_html_()
-    for shown in (speed.verdict_table(None), speed.show_validation(None)):
-        assert shown is not None
-        assert "benchmarks.validate" in shown._repr_html_()
-
-
-def test_the_stored_text_is_the_same_measured_or_not(results: Any) -> None:
-    """A new benchmark must not make the stored notebooks stale."""
-    for table in (speed.ratio_table, speed.rate_table, speed.how_measured):
-        assert repr(table(results)) == repr(table(None))
-    assert repr(speed.verdict_table(None)) == "<validation: verdicts>"
-
-
 @pytest.fixture
 def on_page(monkeypatch: pytest.MonkeyPatch) -> list[tuple[dict, dict]]:
     """Data and metadata of what is displayed."""
     caught: list[tuple[dict, dict]] = []
     monkeypatch.setattr(
-        "IPython.display.display", lambda data, metadata, raw: caught.append((data, metadata))
+        "IPython.display.display", lambda data, metadata=None, raw=False: caught.append((data, metadata))
     )
     return caught
 
 
+def test_what_was_not_measured_is_called_missing(tmp_path: Path, on_page: list) -> None:
+    assert speed.read_speed(tmp_path) is None
+    assert speed.read_validation(tmp_path) is None
+    for table in (speed.ratio_table, speed.rate_table):
+        assert "<code>make bench</code>" in table(None)._repr_html_()
+    assert "benchmarks.validate" in speed.verdict_table(None)._repr_html_()
+    assert "Missing" in speed.how_measured(None)._repr_html_()
+    speed.show_speed(None)
+    speed.show_validation(None)
+    assert len(on_page) == 2
+    assert all("Missing" in data["text/html"] for data, _ in on_page)
+
+
+def test_the_stored_text_is_the_same_measured_or_not(results: Any, on_page: list) -> None:
+    """A new benchmark must not make the stored notebooks stale."""
+    speed.show_speed(results)
+    speed.show_speed(None)
+    assert on_page[0][0]["text/plain"] == on_page[1][0]["text/plain"]
+    for table in (speed.ratio_table, speed.rate_table, speed.how_measured):
+        assert repr(table(results)) == repr(table(None))
+    assert repr(speed.verdict_table(None)) == "<validation: verdicts>"
+
+
 def test_the_plot_has_its_alt_text(results: Any, on_page: list) -> None:
-    assert speed.show_speed(results) is None
+    speed.show_speed(results)
     ((data, metadata),) = on_page
     assert "logarithmic axis" in metadata["image/png"]["alt"]
     assert not any(character.isdigit() for character in data["text/plain"])
@@ -167,7 +167,7 @@ def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
 def test_the_curves_of_both_sides_are_drawn(tmp_path: Path, on_page: list) -> None:
     found = validation(tmp_path)
     verdicts = {"Hopper-v5": found["verdicts"]["Hopper-v5"]}
-    assert speed.show_validation({**found, "verdicts": verdicts}) is None
+    speed.show_validation({**found, "verdicts": verdicts})
     ((_, metadata),) = on_page
     assert "stable-baselines3" in metadata["image/png"]["alt"]
 

@@ -50,6 +50,15 @@ NO_VALIDATION = (
     "Not measured in this copy of the book. `python -m benchmarks.validate` trains both sides (about 45 minutes on two "
     "cores) and writes `benchmarks/results/validation`; then build the book again."
 )
+AS_ABOVE = "Missing, like the table."
+SPEED_ALT = (
+    "Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per contestant: median "
+    "as a marker, range over the repeats as a line, the floor as a dashed vertical line."
+)
+VALIDATION_ALT = (
+    "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, a "
+    "solid line, and of stable-baselines3, a dashed line."
+)
 
 
 @dataclass(frozen=True)
@@ -137,26 +146,21 @@ def how_measured(results: Results | None) -> Shown:
     """Return the circumstances of the benchmark: date, command, machine, versions, work, who could not take part."""
     what = "speed: how it was measured"
     if results is None:
-        return _missing(what, NO_SPEED)
+        return _missing(what, AS_ABOVE)
     lines = [line.removeprefix("* ") for line in _benchmarks("report").how(results)]
     return Shown(what, _code(bullets(lines)))
 
 
-def show_speed(results: Results | None) -> Shown | None:
-    """Put the plot of steps per second, with the floor, on the page; if there is none, return the note that says so.
+def show_speed(results: Results | None) -> None:
+    """Put the plot of steps per second, with the floor, on the page, or the word that it is missing.
 
     Args:
         results: from `read_speed`.
     """
     if results is None:
-        return _missing("speed: plot", NO_SPEED)
+        return _show_missing(SPEED_ALT)
     fig, _ = _benchmarks("report").plot(results)
-    alt_text.show(
-        fig,
-        alt="Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per "
-        "contestant: median as a marker, range over the repeats as a line, the floor as a dashed vertical line.",
-    )
-    return None
+    return alt_text.show(fig, SPEED_ALT)
 
 
 def verdict_table(validation: Results | None) -> Shown:
@@ -185,21 +189,16 @@ def verdict_table(validation: Results | None) -> Shown:
     return Shown(what, table(caption, head, rows, words=(0, 5)))
 
 
-def show_validation(validation: Results | None) -> Shown | None:
-    """Put both sides' learning curves on the page; if there are none, return the note that says so.
+def show_validation(validation: Results | None) -> None:
+    """Put both sides' learning curves on the page, or the word that they are missing.
 
     Args:
         validation: from `read_validation`.
     """
     if validation is None:
-        return _missing("validation: curves", NO_VALIDATION)
+        return _show_missing(VALIDATION_ALT)
     fig, _ = _benchmarks("validate").plot(validation["curves"], validation["verdicts"])
-    alt_text.show(
-        fig,
-        alt="Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this "
-        "engine, a solid line, and of stable-baselines3, a dashed line.",
-    )
-    return None
+    return alt_text.show(fig, VALIDATION_ALT)
 
 
 def _verdict(found: Results, who: ModuleType) -> Sequence[str]:
@@ -224,6 +223,13 @@ def _read(path: Path) -> Results | None:
 
 def _missing(what: str, why: str) -> Shown:
     return Shown(what, _code(paragraph(why, "missing")))
+
+
+def _show_missing(alt: str) -> None:
+    """Say on the page that a figure is missing; the text form is the figure's, so that the stored notebook is the same."""
+    from IPython.display import display
+
+    display({"text/html": paragraph(AS_ABOVE, "missing"), "text/plain": f"Figure: {alt}"}, raw=True)
 
 
 def _code(html: str) -> str:
