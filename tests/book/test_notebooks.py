@@ -1,6 +1,7 @@
 """The stored notebooks are faithful records of a clean run, and the tools that say so cannot be fooled."""
 
 import copy
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,13 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+REFERENCE_PAGES = {
+    # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
+    # every entry must have its own check (`test_every_erratum_is_checked`).
+    "18_errata",
+}
+CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
 
 
 ANATOMY = (
@@ -60,7 +68,7 @@ def test_ignored_outputs_carry_no_claim(path: Path) -> None:
         assert "NBVAL" not in cell.source  # tags, not comments, say what nbval compares
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
 def test_anatomy(path: Path) -> None:
     """Every chapter has the parts that the preface promises."""
     prose = "\n".join(
@@ -68,6 +76,28 @@ def test_anatomy(path: Path) -> None:
     )
     for part in ANATOMY:
         assert part in prose, part
+
+
+def test_reference_pages_exist() -> None:
+    assert {path.stem for path in NOTEBOOKS} >= REFERENCE_PAGES
+
+
+def test_every_erratum_is_checked() -> None:
+    """Each entry says where, what and what instead, stands in the table, and is followed by a cell that asserts."""
+    cells = nbformat.read(ROOT / "notebooks" / "18_errata.ipynb", as_version=4).cells
+    page = "\n".join(f"<code>{c.source}" if c.cell_type == "code" else c.source for c in cells)
+    front, *entries = re.split(r"^\((err-[a-z0-9-]+)\)=\n(?=#)", page, flags=re.MULTILINE)
+    labels, texts = entries[::2], entries[1::2]
+    assert re.findall(r"^\* - \{ref\}`.*<(err-.*)>`$", front, flags=re.MULTILINE) == labels[:-1]
+    assert labels[-1] == "err-correct"
+    for label, text in zip(labels, texts, strict=True):
+        prose, *code = text.split("<code>")
+        assert any(re.search(r"\bassert", cell) for cell in code), label
+        assert "**Check.**" in prose, label
+        if label != "err-correct":
+            assert "**Where.**" in prose, label
+            assert "**Printed.**" in prose or "**Omitted.**" in prose, label
+            assert "**Right.**" in prose or "**Why it matters.**" in prose, label
 
 
 def small_notebook(folder: Path) -> nbformat.NotebookNode:
