@@ -3,8 +3,8 @@
     python tools/student_copies.py [FOLDER]    hand the chapters out into FOLDER (lab/), as `make lab` does
 
 An exercise is a stub, a solution and a grader's cell. In the book the solution comes after the stub and takes its
-place; here it is left out, prose and cells alike, from ``{solution-start}`` to ``{solution-end}``. The book's download
-button hands out the same copies (``tools/build_book.py``).
+place; here it is left out, prose and cells alike, from ``{solution-start}`` to ``{solution-end}``, and so is any other
+cell with the tag ``solution``. The book's download button hands out the same copies (``tools/build_book.py``).
 
 A copy that a student has changed is never overwritten.
 """
@@ -31,23 +31,19 @@ def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         notebook: a chapter, unchanged by this.
 
     Raises:
-        ValueError: a solution's code cell lacks the tag ``solution``, another has it, or the markers do not pair.
+        ValueError: the markers of a solution do not pair.
     """
     student = copy.deepcopy(notebook)
     student.cells, inside = [], False
-    for number, cell in enumerate(notebook.cells):
-        kept = copy.deepcopy(cell)
+    for cell in copy.deepcopy(notebook.cells):
         if cell.cell_type == "code":
-            if inside != ("solution" in cell.metadata.get("tags", [])):
-                raise ValueError(
-                    f"cell {number}: the cells of a solution, and only they, carry the tag `solution`: "
-                    f"{cell.source[:60]!r}"
-                )
-            kept.update(outputs=[], execution_count=None)
+            if inside or "solution" in cell.metadata.get("tags", []):
+                continue
+            cell.update(outputs=[], execution_count=None)
         else:
-            kept.source, inside = without_solutions(cell.source, inside)
-        if kept.source.strip() and not (inside and cell.cell_type == "code"):
-            student.cells.append(kept)
+            cell.source, inside = without_solutions(cell.source, inside)
+        if cell.source.strip():
+            student.cells.append(cell)
     if inside:
         raise ValueError("a solution does not end: {solution-end} is missing")
     return student
