@@ -495,4 +495,32 @@ MUTANTS: tuple[Mutant, ...] = (
         "float(np.nanmean(o.returns[:, -1]))",
         "tests/study/test_analysis.py::test_normalised_scores_are_0_at_the_first_epoch_and_1_at_the_gaussians_end",
     ),
+    Mutant(
+        "the Beta's variance forgets the concentration",
+        "distributions/scaled_beta.py",
+        "(self.concentration0 / total) / (total + 1)",
+        "(self.concentration0 / total) / total",
+        "tests/distributions/test_scaled_beta.py::test_a_cap_is_a_floor_under_the_variance",
+    ),
+    Mutant(
+        "the Beta's entropy counts two digammas too many",
+        "distributions/scaled_beta.py",
+        "+ (alpha + beta - 2) * torch.digamma(alpha + beta)",
+        "+ (alpha + beta) * torch.digamma(alpha + beta)",
+        "tests/distributions/test_scaled_beta.py::test_entropy_falls_with_the_concentration",
+    ),
+    Mutant(
+        "moments have too few nodes",
+        "distributions/quadrature.py",
+        "num_nodes or (128 if double else 48)",
+        "num_nodes or (24 if double else 48)",
+        "tests/distributions/test_logit_normal.py::test_mean_is_a_finite_sum_at_multiples_of_the_variance",
+    ),
+    Mutant(
+        "a grader takes no answer for a wrong one",
+        "book/graders_beta.py",
+        "return NO_POLICY if answer is None else answer",
+        "return answer",
+        "tests/book/test_graders_beta.py::test_known_mistakes_are_named",
+    ),
 )
