@@ -164,6 +164,13 @@ def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
     assert "within ± 15%" in html
 
 
+def test_half_a_validation_is_none(tmp_path: Path) -> None:
+    """Verdicts without the curves behind them, as an interrupted copy would leave them."""
+    assert validation(tmp_path) is not None
+    (tmp_path / "curves.parquet").unlink()
+    assert speed.read_validation(tmp_path) is None
+
+
 def test_the_curves_of_both_sides_are_drawn(tmp_path: Path, on_page: list) -> None:
     found = validation(tmp_path)
     verdicts = {"Hopper-v5": found["verdicts"]["Hopper-v5"]}

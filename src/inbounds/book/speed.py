@@ -52,12 +52,12 @@ NO_VALIDATION = (
 )
 AS_ABOVE = "Missing, like the table."
 SPEED_ALT = (
-    "Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per contestant: median "
-    "as a marker, range over the repeats as a line, the floor as a dashed vertical line."
+    "Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per contestant: "
+    "median as a marker, range over the repeats as a line, the floor as a dashed vertical line."
 )
 VALIDATION_ALT = (
-    "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, a "
-    "solid line, and of stable-baselines3, a dashed line."
+    "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, "
+    "a solid line, and of stable-baselines3, a dashed line."
 )
 
 
@@ -226,7 +226,7 @@ def _missing(what: str, why: str) -> Shown:
 
 
 def _show_missing(alt: str) -> None:
-    """Say on the page that a figure is missing; the text form is the figure's, so that the stored notebook is the same."""
+    """Say on the page that a figure is missing; in the stored notebook it reads like the figure itself."""
     from IPython.display import display
 
     display({"text/html": paragraph(AS_ABOVE, "missing"), "text/plain": f"Figure: {alt}"}, raw=True)
