@@ -80,8 +80,11 @@ class StatementTests(SphinxDirective):
             self.env.note_dependency(str(path))
         in_book = set(self.env.found_docs)
         found = [s for s in statements(root / "notebooks") if f"notebooks/{s.chapter}" in in_book]
+        tests = tests_of(root / "book")
+        if unlisted := [s.label for s in found if s.label not in tests]:
+            raise self.error(f"name the tests of {', '.join(unlisted)} in book/statements.toml")
         container = nodes.container()
-        lines = StringList(list(page(found, tests_of(root / "book"))), source="statements")
+        lines = StringList(list(page(found, tests)), source="statements")
         self.state.nested_parse(lines, self.content_offset, container)
         return container.children
 
