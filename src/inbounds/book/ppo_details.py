@@ -45,33 +45,32 @@ NOT_RUN, NOT_PLANNED = "not yet run", "–"
 
 @dataclass(frozen=True)
 class CostTable:
-    """Changes of the final return, by detail and column; a notebook shows it as a table."""
+    """Changes of the final return, by detail, robot and family; a notebook shows it as a table."""
 
-    columns: Sequence[tuple[str, str]]
-    """Robot and family."""
-    rows: Mapping[str, Sequence[str]]
-    """Detail, in words → a cell for each column."""
+    families: Sequence[str]
+    """The columns."""
+    rows: Mapping[tuple[str, str], Sequence[str]]
+    """Detail, in words, and robot → a cell for each family."""
 
     def __repr__(self) -> str:
-        return f"<table: {len(self.rows)} details, {len(self.columns)} columns of robot and family>"
+        return f"<table: {len(self.rows)} rows of detail and robot, {len(self.families)} families>"
 
     def _repr_html_(self) -> str:
-        heads = "".join(
-            f"<th scope='col'>{robot}, {FAMILIES[family].label}</th>" for robot, family in self.columns
-        )
+        heads = "".join(f"<th scope='col'>{FAMILIES[family].label}</th>" for family in self.families)
         body = "".join(
-            f"<tr><th scope='row'>{html.escape(detail)}</th>"
+            f"<tr><th scope='row'>{html.escape(detail)}</th><td>{robot}</td>"
             + "".join(f"<td>{cell}</td>" for cell in cells)
             + "</tr>"
-            for detail, cells in self.rows.items()
+            for (detail, robot), cells in self.rows.items()
         )
         caption = (
             "Change of the mean final return over ten seeds when one detail of <code>common</code> is changed, "
             "with a 95 % bootstrap interval"
         )
         return (
-            f'<div style="overflow-x:auto"><table class="table"><caption>{caption}</caption>'
-            f"<thead><tr><th scope='col'>changed</th>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
+            f'<div style="overflow-x:auto"><table class="table"><caption>{caption}</caption><thead><tr>'
+            f"<th scope='col'>changed</th><th scope='col'>robot</th>{heads}</tr></thead>"
+            f"<tbody>{body}</tbody></table></div>"
         )
 
 
@@ -84,26 +83,22 @@ def what_details_cost(results: str | Path | Outcomes) -> CostTable:
     Example:
         >>> table = what_details_cost("no/results")
         >>> table
-        <table: 8 details, 6 columns of robot and family>
-        >>> set(table.rows["clip range 0.02"])
-        {'not yet run', '–'}
+        <table: 16 rows of detail and robot, 3 families>
+        >>> table.rows["clip range 0.02", "Hopper"]
+        ['not yet run', '–', 'not yet run']
     """
     planned = [cell for cell in ARMS["mechanisms"] if cell.variant in DETAILS]
     if not isinstance(results, Outcomes):
         compared = {(cell.algorithm, cell.family, cell.robot) for cell in planned}
         plain = [c for c in ARMS["standard"] if (c.algorithm, c.family, c.robot) in compared]
         results = Outcomes.read(StudyFolder(Path(results)), [*planned, *plain])
-    columns = [
-        (robot, family)
-        for robot in dict.fromkeys(cell.robot for cell in planned)
-        for family in FAMILIES
-        if any(cell.family == family for cell in planned)
-    ]
+    families = [family for family in FAMILIES if any(cell.family == family for cell in planned)]
     rows = {
-        words: [_cell(results, variant, robot, family) for robot, family in columns]
+        (words, robot): [_cell(results, variant, robot, family) for family in families]
         for variant, words in DETAILS.items()
+        for robot in dict.fromkeys(cell.robot for cell in planned)
     }
-    return CostTable(columns, rows)
+    return CostTable(families, rows)
 
 
 def _cell(outcomes: Outcomes, variant: str, robot: str, family: str) -> str:
