@@ -10,8 +10,8 @@ with α, β > 1 so that the density has one mode, inside. The KL divergence is
 $$ KL(P‖Q) = log B(α', β')/B(α, β) + (α − α') ψ(α) + (β − β') ψ(β) + (α' − α + β' − β) ψ(α + β) $$
 
 for P = Beta(α, β), Q = Beta(α', β'). Its terms are hundreds of nats for concentrations near 80 while the sum is a
-hundredth: float32 leaves two digits of it, and none of a smaller one. So everything made of log Γ and ψ is evaluated in float64 and
-returned in the type of the parameters.
+hundredth: float32 leaves two digits of it, and none of a smaller one. So everything made of log Γ and ψ is evaluated
+in float64 and returned in the type of the parameters.
 
 Where is the location, where the scale? The mode ω and the total concentration κ are such a pair:
 α = 1 + ωκ, β = 1 + (1 − ω)κ; see `ScaledBeta.from_mode`.
