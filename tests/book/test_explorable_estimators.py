@@ -94,7 +94,7 @@ def test_note_says_when_the_sign_is_wrong() -> None:
 
 
 def test_table_html_and_fallback() -> None:
-    explorable = score_estimators(mu=0.4, sigma=0.5)
+    explorable = score_estimators(mu=0.4, sigma=0.5, share=0.5)
     html = explorable.html(live=False)
     assert len(html) < 120_000
     assert "μ = 0.4, σ = 0.5" in explorable.alt
@@ -102,12 +102,14 @@ def test_table_html_and_fallback() -> None:
         assert look.color in html
         assert look.label in html
     state = run_js(
-        'inbounds.models["score-estimators"]({ mu: 0.4, log_sigma: Math.log(0.5), peak: 1, share: 0 })'
+        'inbounds.models["score-estimators"]({ mu: 0.4, log_sigma: Math.log(0.5), peak: 1, share: 0.5 })'
     )
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
     assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
+    for control in score_estimators().controls:  # as a page starts: the arrow to the left moves something
+        assert control.start < control.value
     fig = explorable.fallback()
     for ax, key in zip(fig.axes, ("mean", "std"), strict=True):
         for line, name in zip(ax.lines[1:], ESTIMATORS, strict=True):

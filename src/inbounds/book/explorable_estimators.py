@@ -100,7 +100,7 @@ class OneStep:
 
 
 def score_estimators(
-    mu: float = 0.8, sigma: float = 1.0, peak: float = 1.0, share: float = 0.0
+    mu: float = 0.8, sigma: float = 1.0, peak: float = 1.0, share: float = 1.0
 ) -> Explorable:
     """Mean and spread of three estimators of the policy gradient, over μ, σ, the best action and the baseline.
 
