@@ -35,7 +35,7 @@ notebooks: setup  ## execute notebooks and store their text outputs  (NB=noteboo
 
 pages: book  ## open every built page in headless Chromium and check it
 	@tools/setup.sh --with-browser
-	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages tests/book/test_videos.py
+	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
 
 serve: book  ## preview the built book on this machine  (PORT=8000)
 	@echo "Serving on http://127.0.0.1:$(PORT)/ (Ctrl-C ends it)"
