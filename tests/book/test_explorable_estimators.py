@@ -7,8 +7,8 @@ import pytest
 from scipy import integrate, stats
 
 from inbounds.book.explorable_estimators import ESTIMATORS, OneStep, score_estimators
+from tests.book.colour_vision import GROUNDS, assert_looks_differ
 from tests.book.test_explorables import run_js
-from tests.book.test_figures import VISION, XYZ, cie_lab, linear_rgb
 
 RNG = np.random.default_rng(5)
 # Corners of the sliders, and points in between: (μ, log σ, best action, baseline).
@@ -124,16 +124,6 @@ def test_values_outside_the_sliders_are_refused(bad: dict[str, float]) -> None:
         score_estimators(**bad)
 
 
-@pytest.mark.parametrize("ground", ["white", "dark"])
+@pytest.mark.parametrize("ground", GROUNDS)
 def test_looks_differ_under_every_colour_vision(ground: str) -> None:
-    colors = [look.color if ground == "white" else look.color_on_dark for look in ESTIMATORS.values()]
-    behind = XYZ[1] @ linear_rgb({"white": "#ffffff", "dark": "#14181e"}[ground])
-    for first in range(3):
-        dim, bright = sorted([XYZ[1] @ linear_rgb(colors[first]), behind])
-        assert (bright + 0.05) / (dim + 0.05) > 2.95
-        for second in range(first):
-            pair = [linear_rgb(colors[i]) for i in (first, second)]
-            for vision in VISION.values():
-                assert np.linalg.norm(cie_lab(vision @ pair[0]) - cie_lab(vision @ pair[1])) > 15
-            assert abs(cie_lab(pair[0])[0] - cie_lab(pair[1])[0]) > 7
-    assert len({look.linestyle for look in ESTIMATORS.values()}) == 3
+    assert_looks_differ(ESTIMATORS.values(), ground, lightness_gap=7)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from inbounds.book.explorable_ppo_clip import CURVES, ppo_clip, surrogate_and_slope
+from tests.book.colour_vision import GROUNDS, assert_looks_differ
 from tests.book.test_explorables import run_js
-from tests.book.test_figures import VISION, XYZ, cie_lab, linear_rgb
 
 MODEL = 'inbounds.models["ppo-clip"]'
 CALL = f"points.map(([ratio, advantage, clip_range]) => {MODEL}({{ ratio, advantage, clip_range }}))"
@@ -97,15 +97,6 @@ def test_values_outside_the_sliders_are_refused(bad: dict[str, float]) -> None:
         ppo_clip(**bad)
 
 
-@pytest.mark.parametrize("ground", ["white", "dark"])
+@pytest.mark.parametrize("ground", GROUNDS)
 def test_looks_differ_under_every_colour_vision(ground: str) -> None:
-    colors = [look.color if ground == "white" else look.color_on_dark for look in CURVES.values()]
-    behind = XYZ[1] @ linear_rgb({"white": "#ffffff", "dark": "#14181e"}[ground])
-    for first in range(3):
-        dim, bright = sorted([XYZ[1] @ linear_rgb(colors[first]), behind])
-        assert (bright + 0.05) / (dim + 0.05) > 2.95
-        for second in range(first):
-            pair = [linear_rgb(colors[i]) for i in (first, second)]
-            for vision in VISION.values():
-                assert np.linalg.norm(cie_lab(vision @ pair[0]) - cie_lab(vision @ pair[1])) > 15
-    assert len({look.linestyle for look in CURVES.values()}) == 3
+    assert_looks_differ(CURVES.values(), ground)

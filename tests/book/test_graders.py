@@ -35,14 +35,8 @@ RIGHT = {"mass_outside": stable, "log_prob_from_latent": log_prob, "entropy_by_q
 
 
 @pytest.mark.parametrize("name", RIGHT)
-def test_right_answers_pass(name: str) -> None:
-    verdict = getattr(graders, name)(RIGHT[name])
-    assert verdict.passed is True, verdict
-
-
-@pytest.mark.parametrize("name", RIGHT)
-@pytest.mark.parametrize("empty", [..., None, NotImplemented])
-def test_an_unanswered_exercise_is_not_a_failure(name: str, empty: object) -> None:
+@pytest.mark.parametrize("empty", [None, NotImplemented])
+def test_a_function_that_returns_nothing_is_unanswered_too(name: str, empty: object) -> None:
     assert getattr(graders, name)(lambda *_: empty).passed is None
 
 

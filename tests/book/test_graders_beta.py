@@ -32,17 +32,6 @@ def torchs_kl(alpha, beta, alpha_new, beta_new):
 RIGHT = {"match_moments": moments, "safe_beta_kl": torchs_kl}
 
 
-@pytest.mark.parametrize("name", RIGHT)
-def test_right_answers_pass(name: str) -> None:
-    verdict = getattr(graders_beta, name)(RIGHT[name])
-    assert verdict.passed is True, verdict
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_an_unanswered_exercise_is_not_a_failure(name: str) -> None:
-    assert getattr(graders_beta, name)(lambda *_: ...).passed is None
-
-
 def uncapped(mean, std, low, high, cap):
     return moments(mean, std, low, high, 1e9)
 

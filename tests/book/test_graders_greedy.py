@@ -63,17 +63,6 @@ RIGHT = {"mode_gradient": gradient, "mean_action": mean}
 ROOT2, ROOT_PI = np.sqrt(2), np.sqrt(np.pi)
 
 
-@pytest.mark.parametrize("name", RIGHT)
-def test_right_answers_pass(name: str) -> None:
-    verdict = getattr(graders, name)(RIGHT[name])
-    assert verdict.passed is True, verdict
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_an_unanswered_exercise_is_not_a_failure(name: str) -> None:
-    assert getattr(graders, name)(lambda *_: ...).passed is None
-
-
 @pytest.mark.parametrize(
     ("name", "wrong", "words"),
     [

@@ -27,17 +27,6 @@ def kl(loc, scale, loc_new, scale_new):
 RIGHT = {"squashed_score": score, "mean_kl": lambda *a: kl(*a).sum(1).mean()}
 
 
-@pytest.mark.parametrize("name", RIGHT)
-def test_right_answers_pass(name: str) -> None:
-    verdict = getattr(graders, name)(RIGHT[name])
-    assert verdict.passed is True, verdict
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_an_unanswered_exercise_is_not_a_failure(name: str) -> None:
-    assert getattr(graders, name)(lambda *_: ...).passed is None
-
-
 def gaussian_score(at, loc, log_scale):
     u = (at - loc) / np.exp(log_scale)
     return np.array([u / np.exp(log_scale), u**2 - 1])

@@ -1,40 +1,26 @@
 """From an empty cell: the chapter's own cells, and the imports that it names, are a working PPO without the package."""
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import nbformat
 import numpy as np
 import pytest
 import torch
 
 from inbounds.book import graders_ppo
+from tests.book import by_hand
 
-CHAPTER = Path(__file__).resolve().parents[2] / "notebooks" / "10_ppo.ipynb"
-TAG = "ppo-by-hand"
-
-
-def program_text() -> str:
-    """The imports as the prose prints them, and every cell that the chapter calls its own."""
-    cells = nbformat.read(CHAPTER, as_version=4).cells
-    (prose,) = (c.source for c in cells if c.cell_type == "markdown" and "```python\nimport math" in c.source)
-    imports = prose.partition("```python\n")[2].partition("```")[0]
-    own = [c.source for c in cells if TAG in c.metadata.get("tags", [])]
-    return "\n\n".join([imports, *own])
+TEXT = by_hand.program_text("10_ppo", tag="ppo-by-hand", first_import="math")
 
 
 @pytest.fixture(scope="module")
 def program() -> dict[str, Any]:
-    namespace: dict[str, Any] = {}
-    exec(compile(program_text(), "the chapter", "exec"), namespace)
-    return namespace
+    return by_hand.run(TEXT)
 
 
 def test_the_program_does_without_the_package() -> None:
-    text = program_text()
-    assert "inbounds" not in text
-    assert len([line for line in text.splitlines() if line.strip()]) < 200
+    assert "inbounds" not in TEXT
+    assert len([line for line in TEXT.splitlines() if line.strip()]) < 200
 
 
 def test_its_loss_and_its_update_pass_the_graders(program: dict[str, Any]) -> None:

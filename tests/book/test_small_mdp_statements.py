@@ -72,10 +72,17 @@ def pair_of(rng: np.random.Generator, reach: float = 1.0) -> Pair:
     return Pair(process, *moments, q, expected(q, *moments[1]) - values, variation, divergence)
 
 
-@given(seed=seeds)
-@many
-def test_the_policy_gradient_theorem(seed: int) -> None:
-    """Σ ρ(s) ∇E[Q(s, a)], Q held, is the derivative of the linear algebra."""
+class Gradient(NamedTuple):
+    """A random process, a random policy that autograd follows, and the policy's gradient by the linear algebra."""
+
+    process: SmallMDP
+    theta: Tensor
+    moments: tuple[Tensor, Tensor]
+    action_values: Tensor
+    truth: Tensor
+
+
+def process_and_gradient(seed: int) -> Gradient:
     rng = np.random.default_rng(seed)
     process = random_process(rng)
     theta = random_theta(rng, process.num_states).requires_grad_()
@@ -83,6 +90,15 @@ def test_the_policy_gradient_theorem(seed: int) -> None:
     (truth,) = torch.autograd.grad(process.performance(*moments), theta, retain_graph=True)
     with torch.no_grad():
         q = process.action_values(process.values(*moments))
+    return Gradient(process, theta, moments, q, truth)
+
+
+@given(seed=seeds)
+@many
+def test_the_policy_gradient_theorem(seed: int) -> None:
+    """Σ ρ(s) ∇E[Q(s, a)], Q held, is the derivative of the linear algebra."""
+    process, theta, moments, q, truth = process_and_gradient(seed)
+    with torch.no_grad():
         visits = process.occupancy(moments[0])
     (theorem,) = torch.autograd.grad(visits @ expected(q, *moments), theta)
     torch.testing.assert_close(theorem, truth, rtol=1e-8, atol=1e-10)
@@ -92,13 +108,8 @@ def test_the_policy_gradient_theorem(seed: int) -> None:
 @many
 def test_without_the_discount_each_state_is_rescaled(seed: int) -> None:
     """Parameters of its own for each state: the usual update is the gradient times ρ¹(s)/ρ(s), so it points uphill."""
-    rng = np.random.default_rng(seed)
-    process = random_process(rng)
-    theta = random_theta(rng, process.num_states).requires_grad_()
-    moments = squashed_moments(*theta)
-    (truth,) = torch.autograd.grad(process.performance(*moments), theta, retain_graph=True)
+    process, theta, moments, q, truth = process_and_gradient(seed)
     with torch.no_grad():
-        q = process.action_values(process.values(*moments))
         visits, undiscounted = (process.occupancy(moments[0], gamma) for gamma in (None, 1.0))
     (usual,) = torch.autograd.grad(undiscounted @ expected(q, *moments), theta)
     torch.testing.assert_close(usual, truth * undiscounted / visits, rtol=1e-7, atol=1e-9)

@@ -11,30 +11,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from inbounds.book import speed
-
-
-def turn(steps: int, seconds: float) -> dict[str, float]:
-    return {"steps": steps, "seconds": seconds, "cpu_seconds": seconds / 2, "peak_bytes": 1.5e9}
+from tests.made_up_speed import made_up_results, ppo_turns, turn
 
 
 def made_up_speed() -> dict[str, Any]:
-    hopper = {
-        "floor": [turn(100, 0.5)] * 3,
-        "inbounds-ppo-10": [turn(100, s) for s in (1.0, 2.0, 4.0)],
-        "sb3-ppo": [turn(10, s) for s in (1.0, 2.0, 8.0)],
-        "sb3-ppo-plain": [turn(10, 1.0)] * 3,
-    }
+    hopper = {**ppo_turns(), "sb3-ppo-plain": [turn(10, 1.0)] * 3}
     ant = {"inbounds-ppo-10": hopper["inbounds-ppo-10"], "inbounds-ppo-1": [turn(10, 0.3)] * 3}
-    return {
-        "date": "2026-01-01",
-        "command": "python -m made_up",
-        "machine": {"processor": "P & Q", "cores": 2, "load": [0, 0, 0]},
-        "versions": {"torch": "2"},
-        "work": {"horizon": 2048, "num_epochs": 10, "minibatch_size": 64, "hidden": [64, 64]},
-        "repeats": 3,
-        "unavailable": {"sbx-ppo": "No module named 'sbx'"},
-        "measurements": {"Hopper-v5": hopper, "Ant-v5": ant},
-    }
+    return made_up_results({"Hopper-v5": hopper, "Ant-v5": ant})
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from benchmarks import anatomy, report, run
 from benchmarks.contestants import CONTESTANTS, inbounds_config
 from benchmarks.floor import Floor
 from benchmarks.work import ENVS, Work, flops_per_step, multiply_adds
+from tests.made_up_speed import made_up_results, ppo_turns
 
 
 def test_the_floor_counts_the_operations_of_the_networks() -> None:
@@ -52,42 +53,24 @@ def test_the_replay_is_the_physics_that_was_recorded() -> None:
     np.testing.assert_array_equal(batch.state[alive, time_and_pose], floor.states[11][alive, time_and_pose])
 
 
-def turn(steps: int, seconds: float) -> dict[str, float]:
-    return {"steps": steps, "seconds": seconds, "cpu_seconds": seconds / 2, "peak_bytes": 1.5e9}
-
-
-def made_up_results() -> dict:
-    turns = {
-        "inbounds-ppo-10": [turn(100, s) for s in (1.0, 2.0, 4.0)],
-        "sb3-ppo": [turn(10, s) for s in (1.0, 2.0, 8.0)],
-        "floor": [turn(100, 0.5)] * 3,
-    }
-    return {
-        "date": "2026-01-01",
-        "command": "made up",
-        "machine": {"processor": "P", "cores": 2, "load": [0, 0, 0]},
-        "versions": {"torch": "2"},
-        "work": {"horizon": 2048, "num_epochs": 10, "minibatch_size": 64, "hidden": [64, 64]},
-        "repeats": 3,
-        "unavailable": {"sbx-ppo": "No module named 'sbx'"},
-        "measurements": {"Humanoid-v5": turns},
-    }
+def humanoid_results() -> dict:
+    return made_up_results({"Humanoid-v5": ppo_turns()})
 
 
 def test_ratios_pair_what_was_measured_together() -> None:
-    results = made_up_results()
+    results = humanoid_results()
     ratios = report.ratio(results, "Humanoid-v5", "inbounds-ppo-10", "sb3-ppo")
     assert ratios.tolist() == [10.0, 10.0, 20.0]  # not the ratio of medians, 10 by accident of the last
     assert report.steps_per_second(results, "Humanoid-v5", "floor", "cpu_seconds").tolist() == [400.0] * 3
 
 
 def test_the_report_leads_with_ratios_and_hides_nothing() -> None:
-    text = report.markdown(made_up_results())
+    text = report.markdown(humanoid_results())
     assert text.index("## Ratios") < text.index("## Humanoid-v5")
     assert "| 10.00 (10.00 to 20.00) | 10.00 (10.00 to 20.00) | 2.8: met |" in text
     assert "1.50 GB" in text
     assert "sbx-ppo (No module named 'sbx')" in text
-    slow = made_up_results()
+    slow = humanoid_results()
     for turn in slow["measurements"]["Humanoid-v5"]["inbounds-ppo-10"]:
         turn["seconds"] *= 10
     assert "2.8: **missed**" in report.markdown(slow)

@@ -36,6 +36,24 @@ def svg_bytes(fig: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def last_picture(fig: Figure, alt: str) -> tuple[str, int]:
+    """Close a figure, and return its PNG in base64 and its width in CSS pixels.
+
+    Raises:
+        ValueError: the alt text says less than a sentence would.
+    """
+    import matplotlib.pyplot as plt
+
+    if len(alt.split()) < 4:
+        raise ValueError(
+            f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
+        )
+    png = base64.b64encode(png_bytes(fig)).decode("ascii")
+    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
+    plt.close(fig)
+    return png, width
+
+
 def show(fig: Figure, alt: str) -> None:
     """Put a figure on the page with its alt text, and close it.
 
@@ -50,17 +68,10 @@ def show(fig: Figure, alt: str) -> None:
     Raises:
         ValueError: If the alt text says less than a sentence would.
     """
-    import matplotlib.pyplot as plt
     from IPython.display import display
 
     alt = " ".join(alt.split())
-    if len(alt.split()) < 4:
-        raise ValueError(
-            f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
-        )
-    png = base64.b64encode(png_bytes(fig)).decode("ascii")
-    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
-    plt.close(fig)
+    png, width = last_picture(fig, alt)
     display(
         {"image/png": png, "text/plain": f"Figure: {alt}"},
         metadata={"image/png": {"alt": alt, "width": width}},

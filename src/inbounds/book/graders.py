@@ -8,7 +8,7 @@ The references here are written differently from the chapters' solutions, so tha
 
 import html
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -84,6 +84,79 @@ def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verd
                 return Verdict(name, False, diagnosis)
         return Verdict(name, False, f"{case.hint}: expected {brief(case.expected)}, got {brief(answer)}")
     return Verdict(name, True, success)
+
+
+def judge_by_checks(
+    function: Callable[..., Any],
+    checks: Mapping[str, Callable[[Any], str | None]],
+    answered: Callable[[], bool],
+    fallback: str = "your function",
+) -> Verdict:
+    """Run named checks in their order; the first that finds something wrong gives the verdict.
+
+    Args:
+        function: the reader's.
+        checks: by name, what is wrong with a function, or nothing.
+        answered: whether the function returns something of the right kind yet.
+        fallback: what to call a function without a name.
+
+    Example:
+        >>> checks = {"sign": lambda f: "" if f(-1) < 0 else "it loses the sign"}
+        >>> judge_by_checks(abs, checks, lambda: abs(1) is not ...)
+        ✗ not yet: abs: check "sign": it loses the sign
+    """
+    name = getattr(function, "__name__", fallback)
+    for check, wrong in checks.items():
+        try:
+            if not answered():
+                return Verdict(name, None, "write it, and run this cell again")
+            complaint = wrong(function)
+        except Exception as error:
+            return Verdict(name, False, f'check "{check}": it raised {type(error).__name__}: {error}')
+        if complaint:
+            return Verdict(name, False, f'check "{check}": {complaint}')
+    return Verdict(name, True, f"all {len(checks)} checks pass")
+
+
+def judge_diagnosis(
+    answers: Mapping[Any, Any],
+    broken: Mapping[Any, Callable[..., Any]],
+    checks: Mapping[str, Callable[[Any], str | None]],
+    noun: str,
+    stopped_before: str,
+    lets_pass: str,
+) -> Verdict:
+    """Judge the reader's prediction of which check stops which broken function.
+
+    Args:
+        answers: the reader's, by function: the name of the first check that finds something wrong.
+        broken: the functions, under the same names.
+        checks: in their order.
+        noun: what one of the functions is called.
+        stopped_before: hint when an earlier check stops it; ``{answer}`` stands for the check named.
+        lets_pass: hint when the check named finds nothing wrong.
+
+    Example:
+        >>> checks = {"sign": lambda f: "" if f(-1) < 0 else "it loses the sign"}
+        >>> judge_diagnosis({"A": "sign"}, {"A": abs}, checks, "function", "earlier", "later")
+        ✓ passed: diagnosis: every bug is stopped by the check that you named
+    """
+    if any(answers.get(name, ...) is ... for name in broken):
+        return Verdict("diagnosis", None, f"name a check for every {noun}, and run this cell again")
+    if unknown := [answer for answer in answers.values() if answer not in checks]:
+        return Verdict(
+            "diagnosis", False, f"no check is called {unknown[0]!r}; there are {', '.join(checks)}"
+        )
+    order = list(checks)
+    for name, function in broken.items():
+        answer = answers[name]
+        first = next((check for check, wrong in checks.items() if wrong(function)), None)
+        if answer == first:
+            continue
+        stopped = first is not None and order.index(first) < order.index(answer)
+        hint = (stopped_before if stopped else lets_pass).format(answer=answer)
+        return Verdict("diagnosis", False, f"{noun} {name}: {hint}")
+    return Verdict("diagnosis", True, "every bug is stopped by the check that you named")
 
 
 def agrees(answer: Any, expected: Any, rtol: float) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from inbounds.book.graders import Case, Verdict, judge
+from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
 from inbounds.book.ppo_checks import ACT, CHECKS, GAUSSIAN, OBS, STEPS, Loss, Scene, policy_loss
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig, Rollout, ppo
 from inbounds.learning.laws import NORMAL
@@ -77,18 +77,11 @@ def ppo_loss(function: Loss) -> Verdict:
         >>> ppo_loss(lambda *arguments: ...)
         … not answered: <lambda>: write it, and run this cell again
     """
-    name = getattr(function, "__name__", "your function")
-    for check, wrong in CHECKS.items():
-        try:
-            scene = Scene.of(0)
-            if not isinstance(policy_loss(function, scene), Tensor):
-                return Verdict(name, None, "write it, and run this cell again")
-            complaint = wrong(function)
-        except Exception as error:
-            return Verdict(name, False, f'check "{check}": it raised {type(error).__name__}: {error}')
-        if complaint:
-            return Verdict(name, False, f'check "{check}": {complaint}')
-    return Verdict(name, True, f"all {len(CHECKS)} checks pass")
+
+    def answered() -> bool:
+        return isinstance(policy_loss(function, Scene.of(0)), Tensor)
+
+    return judge_by_checks(function, CHECKS, answered)
 
 
 def diagnosis(answers: Mapping[str, Any], losses: Mapping[str, Loss]) -> Verdict:
@@ -102,19 +95,8 @@ def diagnosis(answers: Mapping[str, Any], losses: Mapping[str, Loss]) -> Verdict
         >>> diagnosis({"A": ...}, {"A": lambda *_: torch.zeros(3)})
         … not answered: diagnosis: name a check for every loss, and run this cell again
     """
-    if any(answers.get(name, ...) is ... for name in losses):
-        return Verdict("diagnosis", None, "name a check for every loss, and run this cell again")
-    if unknown := [answer for answer in answers.values() if answer not in CHECKS]:
-        return Verdict(
-            "diagnosis", False, f"no check is called {unknown[0]!r}; there are {', '.join(CHECKS)}"
-        )
-    for name, loss in losses.items():
-        first = next((check for check, wrong in CHECKS.items() if wrong(loss)), "none")
-        if answers[name] != first:
-            earlier = list(CHECKS).index(answers[name]) > list([*CHECKS, "none"]).index(first)
-            hint = "an earlier check stops it" if earlier else "it gets past that one"
-            return Verdict("diagnosis", False, f"loss {name}: {hint}")
-    return Verdict("diagnosis", True, "every bug is stopped by the check you named")
+    stopped_before, lets_pass = "an earlier check stops it", "it gets past that one"
+    return judge_diagnosis(answers, losses, CHECKS, "loss", stopped_before, lets_pass)
 
 
 class _OneOrder:

@@ -24,7 +24,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Normal, kl_divergence
 
-from inbounds.book.graders import Case, Verdict, judge
+from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
 
 __all__ = ["CHECKS", "diagnosis", "linear_fisher_product", "trpo_step"]
 
@@ -193,20 +193,14 @@ def trpo_step(function: Step) -> Verdict:
         >>> trpo_step(lambda surrogate, mean_kl, theta, **numbers: theta)
         ✗ not yet: <lambda>: check "direction": it does not move, although every short step uphill is allowed
     """
-    name = getattr(function, "__name__", "your step")
     problem = _problem()
-    for check, wrong in CHECKS.items():
-        try:
-            answer = function(problem.surrogate, problem.mean_kl, problem.start, max_kl=MAX_KL, damping=DAMPING,
-                              cg_iters=CG_ITERS)  # fmt: skip
-            if not isinstance(answer, Tensor):
-                return Verdict(name, None, "write it, and run this cell again")
-            complaint = wrong(function)
-        except Exception as error:
-            return Verdict(name, False, f'check "{check}": it raised {type(error).__name__}: {error}')
-        if complaint:
-            return Verdict(name, False, f'check "{check}": {complaint}')
-    return Verdict(name, True, f"all {len(CHECKS)} checks pass")
+
+    def answered() -> bool:
+        answer = function(problem.surrogate, problem.mean_kl, problem.start, max_kl=MAX_KL, damping=DAMPING,
+                          cg_iters=CG_ITERS)  # fmt: skip
+        return isinstance(answer, Tensor)
+
+    return judge_by_checks(function, CHECKS, answered, fallback="your step")
 
 
 def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Verdict:
@@ -220,23 +214,14 @@ def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Verdict:
         >>> diagnosis({1: "length"}, {1: lambda surrogate, mean_kl, theta, **numbers: theta})
         ✗ not yet: diagnosis: TRPO 1: it gets as far as "length"? It is stopped before that
     """
-    if any(answers.get(name, ...) is ... for name in steps):
-        return Verdict("diagnosis", None, "name a check for every TRPO, and run this cell again")
-    if unknown := [answer for answer in answers.values() if answer not in CHECKS]:
-        return Verdict(
-            "diagnosis", False, f"no check is called {unknown[0]!r}; there are {', '.join(CHECKS)}"
-        )
-    order = list(CHECKS)
-    for name, step in steps.items():
-        first = next((check for check, wrong in CHECKS.items() if wrong(step)), None)
-        if answers[name] == first:
-            continue
-        if first is not None and order.index(first) < order.index(answers[name]):
-            hint = f'it gets as far as "{answers[name]}"? It is stopped before that'
-        else:
-            hint = f'its {answers[name]} is right: "{answers[name]}" lets it pass'
-        return Verdict("diagnosis", False, f"TRPO {name}: {hint}")
-    return Verdict("diagnosis", True, "every bug is stopped by the check that you named")
+    return judge_diagnosis(
+        answers,
+        steps,
+        CHECKS,
+        noun="TRPO",
+        stopped_before='it gets as far as "{answer}"? It is stopped before that',
+        lets_pass='its {answer} is right: "{answer}" lets it pass',
+    )
 
 
 def linear_fisher_product(function: Callable[..., Any]) -> Verdict:

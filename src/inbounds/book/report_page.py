@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 
-import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.alt_text import PIXELS_PER_INCH, png_bytes
+from inbounds.book.alt_text import last_picture
 
 _CSS = """
 :root { color-scheme: light; }
@@ -91,13 +89,7 @@ def figure(fig: Figure, alt: str, caption: str = "") -> str:
     Raises:
         ValueError: the alt text says less than a sentence would.
     """
-    if len(alt.split()) < 4:
-        raise ValueError(
-            f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
-        )
-    png = base64.b64encode(png_bytes(fig)).decode("ascii")
-    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
-    plt.close(fig)
+    png, width = last_picture(fig, alt)
     image = f'<img src="data:image/png;base64,{png}" width="{width}" alt="{escape(alt)}">'
     return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
 
