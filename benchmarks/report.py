@@ -144,6 +144,7 @@ def _memory_turns(results: Mapping[str, Any]) -> Sequence[Mapping[str, float]]:
 def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
     """Return a figure, a panel per environment, and its alt text."""
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     from inbounds.book import figures
 
@@ -171,6 +172,9 @@ def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
         )
         ax.set_title(env, loc="left")
         ax.set(xscale="log")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda rate, _: f"{rate:,.0f}"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
     axes[-1, 0].set_xlabel("env steps per second", loc="right")
     facts = [
         f"on {bar.env} {CONTESTANTS[bar.ours].label} is {np.median(values):.1f} times as fast as "

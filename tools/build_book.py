@@ -21,7 +21,18 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "_build"
 INDEX = BUILD / "html" / "index.html"
 STAMP = BUILD / "built-from"
-CODE = ("src", "results", "constraints.txt", "pyproject.toml")
+CODE = (
+    "src",
+    "results",
+    "benchmarks/contestants.py",
+    "benchmarks/report.py",
+    "benchmarks/validate.py",
+    "benchmarks/results/speed.json",
+    "benchmarks/results/validation/curves.parquet",
+    "benchmarks/results/validation/validation.json",
+    "constraints.txt",
+    "pyproject.toml",
+)
 PAGES = ("book", "notebooks", "tools/build_book.py", "tools/student_copies.py", "_config.yml", "_toc.yml")
 
 
