@@ -1,6 +1,8 @@
 """The benchmark counts what it says it counts, and runs."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -131,3 +133,17 @@ def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture
     assert "## Ratios" in (tmp_path / "quick" / "speed.md").read_text()
     assert (tmp_path / "quick" / "speed.svg").stat().st_size > 1000
     assert "Ratios" in capsys.readouterr().out
+
+
+def test_the_readme_quotes_what_was_measured() -> None:
+    root = Path(report.__file__).resolve().parents[1]
+    results = json.loads((root / "benchmarks" / "results" / "speed.json").read_text(encoding="utf8"))
+    (quoted,) = (
+        part for part in (root / "README.md").read_text(encoding="utf8").split("\n\n") if "How fast" in part
+    )
+    measured = {
+        (bar.env.partition("-")[0], "TRPO" if "trpo" in bar.ours else "PPO"): f"{np.median(values):.1f}"
+        for bar, values in report.bars(results)
+    }
+    found = re.findall(r"(\d+\.\d) on\s+(\w+)( under TRPO)?", quoted)
+    assert {(env, "TRPO" if trpo else "PPO"): number for number, env, trpo in found} == measured
