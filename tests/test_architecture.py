@@ -12,6 +12,7 @@ MAY_IMPORT = {
     "distributions": set(),
     "robots": set(),
     "learning": {"distributions", "robots"},
+    "integrations": {"distributions"},
     "study": {"distributions", "robots", "learning"},
     "book": {"distributions", "robots", "learning", "study"},
     "cli": {"distributions", "robots", "learning", "study", "book"},

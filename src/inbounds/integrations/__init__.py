@@ -1,0 +1,10 @@
+"""The book's laws in libraries that train policies themselves: one module per library, imported by name.
+
+| Library           | Module                                    | What it gives                                      |
+|-------------------|-------------------------------------------|----------------------------------------------------|
+| stable-baselines3 | `inbounds.integrations.stable_baselines3` | `LogitNormalPolicy`, for PPO, A2C and TRPO         |
+| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, for any law of the book and a loss |
+
+Both keep the rule of the book: the library stores, and scores, the *latent*; the action is made from it on the way
+into the environment. Neither library is needed by the rest of the package: `pip install "inbounds[integrations]"`.
+"""

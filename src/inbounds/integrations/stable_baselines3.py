@@ -1,0 +1,142 @@
+r"""The logit-normal as a policy of stable-baselines3: PPO, A2C, and sb3-contrib's TRPO take it by name of its class.
+
+    model = PPO(LogitNormalPolicy, env)
+
+The peer's own Gaussian draws an action in the *box's units* and lets the environment clip it; its buffer keeps what
+was drawn. Here what is drawn, kept and scored is the latent z ~ N(μ, σ²), and the peer's hook for squashed policies
+(`unscale_action`) makes the action low + (high − low) · sigmoid(z) of it on the way into the environment. So a
+saturated action is scored exactly, its density cancels in every ratio, and an asymmetric box needs no wrapper.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from torch import Tensor
+
+from inbounds.distributions import LogitNormal
+
+try:
+    from stable_baselines3.common.distributions import DiagGaussianDistribution
+    from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.common.type_aliases import Schedule
+except ImportError as error:
+    raise ImportError('stable-baselines3 is not installed: pip install "inbounds[integrations]"') from error
+
+__all__ = ["LogitNormalDistribution", "LogitNormalPolicy"]
+
+
+class LogitNormalDistribution(DiagGaussianDistribution):
+    """A box of independent logit-normals, in the peer's interface: its "actions" are latents `[B, A]`.
+
+    It inherits the peer's head: a layer for loc, and one free log σ per dimension.
+
+    Args:
+        low: `[A]` lower bounds of the action, in its own units.
+        high: `[A]` upper bounds.
+
+    Example:
+        >>> law = LogitNormalDistribution(np.array([0.0, -2.0]), np.array([8.0, 1.0]))
+        >>> _ = law.proba_distribution(torch.zeros(1, 2), torch.zeros(2))
+        >>> law.action(law.mode()).tolist()  # the middle of the box, with any σ
+        [[4.0, -0.5]]
+        >>> round(law.log_prob(torch.zeros(1, 2)).item(), 3)  # of the action, from its latent
+        -2.243
+    """
+
+    distribution: LogitNormal  # type: ignore[assignment]  # the peer's is a Normal
+
+    def __init__(self, low: NDArray[Any], high: NDArray[Any]) -> None:
+        super().__init__(len(low))
+        self.low, self.high = (torch.as_tensor(np.array(bound)) for bound in (low, high))
+
+    def proba_distribution(self, mean_actions: Tensor, log_std: Tensor) -> LogitNormalDistribution:
+        """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them."""
+        low, high = (bound.to(mean_actions) for bound in (self.low, self.high))
+        self.distribution = LogitNormal(mean_actions, log_std.exp(), low, high, validate_args=False)
+        return self
+
+    def log_prob(self, actions: Tensor) -> Tensor:
+        """Return the log-density `[B]` of the *actions* that latents `[B, A]` stand for, in nats."""
+        return self.distribution.log_prob_latent(actions).sum(-1)
+
+    def entropy(self) -> Tensor:
+        """Return the differential entropy `[B]` of the action in its box, in nats."""
+        return self.distribution.entropy().sum(-1)
+
+    def sample(self) -> Tensor:
+        """Return reparametrised latents `[B, A]`."""
+        return self.distribution.rsample_latent()
+
+    def mode(self) -> Tensor:
+        """Return the latents `[B, A]` of the medians: what the peer calls deterministic, and a bijection keeps."""
+        return self.distribution.loc
+
+    def action(self, latent: Tensor) -> Tensor:
+        """Return the actions `[B, A]` that latents stand for, strictly inside the box."""
+        return self.distribution.latent_to_value(latent)
+
+
+class LogitNormalPolicy(ActorCriticPolicy):
+    """The peer's actor-critic with logit-normal actions in any bounded box; see the module.
+
+    Args:
+        observation_space: as the peer's.
+        action_space: a bounded, one-dimensional Box.
+        lr_schedule: as the peer's.
+        **options: as the peer's; `log_std_init` is the log σ of the *latent*: 0 executes a standard deviation of
+            0.42 of half the range. Generalised state-dependent exploration (`use_sde`) is not for it.
+
+    Raises:
+        ValueError: another action space, or `use_sde`.
+
+    Example:
+        >>> import gymnasium
+        >>> from stable_baselines3 import PPO
+        >>> model = PPO(LogitNormalPolicy, "Pendulum-v1", n_steps=64, device="cpu", seed=0).learn(64)
+        >>> action, _ = model.predict(np.zeros((1000, 3), np.float32))
+        >>> bool((abs(action) < 2).all())  # N·m: never on a bound
+        True
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        lr_schedule: Schedule,
+        **options: Any,
+    ) -> None:
+        if (
+            not isinstance(action_space, spaces.Box)
+            or len(action_space.shape) != 1
+            or not action_space.is_bounded()
+        ):
+            raise ValueError(
+                f"LogitNormalPolicy needs a bounded, one-dimensional Box of actions, got {action_space}: wrap the "
+                "environment (gymnasium.wrappers.RescaleAction, FlattenAction) so that it has one"
+            )
+        if options.get("use_sde"):
+            raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
+        super().__init__(observation_space, action_space, lr_schedule, **options)
+        self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        """Put our law in the place of the peer's choice before it builds the heads."""
+        self.action_dist = LogitNormalDistribution(*self._bounds)
+        super()._build(lr_schedule)
+
+    def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
+        """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
+        latent = torch.as_tensor(scaled_action)
+        low, high = (torch.as_tensor(np.array(bound)).to(latent) for bound in self._bounds)
+        law = LogitNormal(latent, torch.ones_like(latent), low, high, validate_args=False)
+        return law.latent_to_value(latent).numpy().astype(self.action_space.dtype)
+
+    @property
+    def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        box: Any = self.action_space
+        return box.low, box.high

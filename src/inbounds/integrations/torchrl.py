@@ -1,0 +1,144 @@
+r"""The laws of the book as policies of TorchRL: `bounded_actor` makes the two modules that a loss and a rollout need.
+
+TorchRL's losses score what lies under a key of the batch. An actor that writes the action there, as one with TorchRL's
+own `TanhNormal` does, has the loss invert the map from an action that may have been rounded onto its bound. Here the
+actor writes the *latent* and its score, the loss reads the latent, and one more module makes the action of it for the
+environment:
+
+    actor, acting = bounded_actor(network, LogitNormal, low, high)
+    loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
+    batch = env.rollout(1000, acting)       # writes both, and "action"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor, nn
+from torch.distributions import Distribution, constraints, kl_divergence, register_kl
+
+from inbounds.distributions import LogitNormal, ScaledBeta
+from inbounds.distributions.bounds import TensorLike
+
+try:
+    from tensordict.nn import TensorDictModule, TensorDictSequential
+    from torchrl.modules import ProbabilisticActor
+except ImportError as error:
+    raise ImportError('TorchRL is not installed: pip install "inbounds[integrations]"') from error
+
+__all__ = ["PARAMETERS", "Latents", "bounded_actor"]
+
+Law = LogitNormal | ScaledBeta
+
+PARAMETERS: Mapping[type[Law], tuple[str, str]] = MappingProxyType(
+    {LogitNormal: ("loc", "scale"), ScaledBeta: ("concentration1", "concentration0")}
+)
+"""The two parameters `[..., A]` that a network must give for each law, in order."""
+
+
+class Latents(Distribution):
+    """The latents `[..., A]` of a law's independent components, scored as the actions that they stand for.
+
+    Args:
+        law: of the action, batch shape `[..., A]`.
+
+    Example:
+        >>> law = LogitNormal(torch.zeros(2), 1.0, torch.tensor([0.0, -2.0]), torch.tensor([8.0, 1.0]))
+        >>> latents = Latents(law)
+        >>> latents.event_shape, latents.deterministic_sample.tolist()
+        (torch.Size([2]), [0.0, 0.0])
+        >>> action = law.latent_to_value(torch.ones(2))
+        >>> bool(torch.isclose(latents.log_prob(torch.ones(2)), law.log_prob(action).sum()))
+        True
+    """
+
+    arg_constraints: ClassVar[dict[str, constraints.Constraint]] = {}
+
+    def __init__(self, law: Law) -> None:
+        self.law = law
+        self.has_rsample = law.has_rsample
+        super().__init__(law.batch_shape[:-1], law.batch_shape[-1:], validate_args=False)
+
+    def rsample(self, sample_shape: Any = ()) -> Tensor:
+        """Return reparametrised latents `[*sample_shape, ..., A]`."""
+        return self.law.rsample_latent(sample_shape)
+
+    def log_prob(self, value: Tensor) -> Tensor:
+        """Return the log-density `[...]` of the *actions* that latents `[..., A]` stand for, in nats."""
+        return self.law.log_prob_latent(value).sum(-1)
+
+    def entropy(self) -> Tensor:
+        """Return the differential entropy `[...]` of the action in its box, in nats."""
+        return self.law.entropy().sum(-1)
+
+    @property
+    def deterministic_sample(self) -> Tensor:
+        """`[..., A]` the latents of a logit-normal's median, or of a Beta's mean: TorchRL's deterministic action."""
+        return self.law.loc if isinstance(self.law, LogitNormal) else self.law.value_to_latent(self.law.mean)
+
+
+@register_kl(Latents, Latents)
+def _kl_latents_latents(p: Latents, q: Latents) -> Tensor:
+    """KL(p‖q) of the laws of the action, `[...]`, in nats: exact, where TorchRL would estimate it from a sample."""
+    return kl_divergence(p.law, q.law).sum(-1)
+
+
+def bounded_actor(
+    network: nn.Module,
+    law: type[Law],
+    low: TensorLike,
+    high: TensorLike,
+    in_keys: Sequence[str] = ("observation",),
+) -> tuple[ProbabilisticActor, TensorDictSequential]:
+    """Return a policy with bounded actions, once for the loss and once for the environment; they share the network.
+
+    Args:
+        network: from what is under `in_keys` to the two parameters of `PARAMETERS[law]`, `[..., A]` each.
+        law: `LogitNormal` or `ScaledBeta`.
+        low: `[A]` lower bounds of the action, in its own units.
+        high: `[A]` upper bounds.
+        in_keys: what the network reads.
+
+    Returns:
+        The actor, which writes the parameters, `latent` `[..., A]` and `latent_log_prob` `[...]`: give it to a loss.
+        And the same followed by the module that writes `action` `[..., A]`: let it act.
+
+    Raises:
+        ValueError: another law.
+
+    Example:
+        >>> from tensordict import TensorDict
+        >>> from torchrl.modules import NormalParamExtractor
+        >>> network = nn.Sequential(nn.Linear(3, 4), NormalParamExtractor())
+        >>> actor, acting = bounded_actor(network, LogitNormal, [0.0, -2.0], [8.0, 1.0])
+        >>> batch = acting(TensorDict(observation=torch.randn(1000, 3), batch_size=[1000]))
+        >>> batch["action"].shape, bool((batch["action"] > torch.tensor([0.0, -2.0])).all())
+        (torch.Size([1000, 2]), True)
+    """
+    if law not in PARAMETERS:
+        raise ValueError(f"bounded_actor knows the laws LogitNormal and ScaledBeta, not {law}")
+    low, high = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in (low, high))
+    names = PARAMETERS[law]
+
+    def latents(**parameters: Tensor) -> Latents:
+        return Latents(law(**parameters, low=low, high=high, validate_args=False))
+
+    def action(latent: Tensor) -> Tensor:
+        """Any law with these bounds has the same map."""
+        ones = torch.ones_like(latent)
+        return law(ones, ones, low.to(latent), high.to(latent), validate_args=False).latent_to_value(latent)
+
+    actor = ProbabilisticActor(
+        TensorDictModule(network, in_keys=list(in_keys), out_keys=list(names)),
+        in_keys=list(names),
+        out_keys=["latent"],
+        distribution_class=latents,
+        return_log_prob=True,
+        log_prob_key="latent_log_prob",
+    )
+    return actor, TensorDictSequential(
+        actor, TensorDictModule(action, in_keys=["latent"], out_keys=["action"])
+    )

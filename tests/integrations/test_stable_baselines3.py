@@ -1,0 +1,139 @@
+"""The logit-normal in stable-baselines3: it scores actions, stores latents, and is a Gaussian behind a sigmoid."""
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sb3_contrib import TRPO
+from scipy import integrate, stats
+from stable_baselines3 import A2C, PPO
+from stable_baselines3.common.distributions import kl_divergence
+
+from inbounds.integrations.stable_baselines3 import LogitNormalDistribution, LogitNormalPolicy
+from tests.integrations.tank import HIGH, LOW, BehindSigmoid, Tank
+
+SMALL = {"device": "cpu", "seed": 3, "n_steps": 128}
+
+
+def law(loc: list[list[float]], log_std: list[float]) -> LogitNormalDistribution:
+    found = LogitNormalDistribution(LOW, HIGH)
+    return found.proba_distribution(
+        torch.tensor(loc, dtype=torch.float64), torch.tensor(log_std, dtype=torch.float64)
+    )
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    z=st.tuples(*2 * [st.floats(-12, 12)]),
+    loc=st.tuples(*2 * [st.floats(-3, 3)]),
+    log_std=st.tuples(*2 * [st.floats(-2, 1)]),
+)
+def test_a_latent_is_scored_as_its_action(z, loc, log_std) -> None:
+    latent = torch.tensor([z], dtype=torch.float64)
+    ours = law([list(loc)], list(log_std))
+    action = ours.action(latent).numpy()[0]
+    unit = (action - LOW) / (HIGH - LOW)
+    expected = 0.0  # change of variables, by SciPy
+    for i in range(2):
+        density = stats.norm.logpdf(z[i], loc[i], np.exp(log_std[i]))
+        expected += density - np.log(unit[i]) - np.log(1 - unit[i]) - np.log(float(HIGH[i] - LOW[i]))
+    assert np.isclose(ours.log_prob(latent).item(), expected, rtol=1e-5, atol=1e-5)
+    assert (action > LOW).all()
+    assert (action < HIGH).all()
+
+
+def test_entropy_is_that_of_the_action() -> None:
+    ours = law([[0.7, -1.2]], [0.0, 0.5])
+
+    def surprise(z: float, i: int) -> float:
+        at = torch.full((1, 2), z, dtype=torch.float64)
+        each = ours.distribution.log_prob_latent(at)[0, i].item()
+        return -each * stats.norm.pdf(z, (0.7, -1.2)[i], np.exp((0.0, 0.5)[i]))
+
+    expected = sum(integrate.quad(surprise, -20, 20, args=(i,))[0] for i in range(2))
+    assert ours.entropy().item() == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_saturated_action_keeps_its_score() -> None:
+    """In single precision, at latents whose actions are on the bound to the last bit."""
+    ours = LogitNormalDistribution(LOW, HIGH)
+    loc = torch.tensor([[28.0, -28.0]], requires_grad=True)
+    latent = torch.tensor([[30.0, -31.0]])
+    ours.proba_distribution(loc, torch.zeros(2)).log_prob(latent).sum().backward()
+    assert loc.grad is not None
+    assert loc.grad.tolist() == [[2.0, -3.0]]  # (z − μ)/σ²
+
+
+@pytest.mark.parametrize("algorithm", [PPO, A2C, TRPO])
+def test_the_buffer_holds_latents_and_the_tank_gets_their_actions(algorithm) -> None:
+    tank = Tank()
+    model = algorithm(LogitNormalPolicy, tank, **SMALL).learn(128)
+    latent = model.rollout_buffer.actions.reshape(-1, 2).astype(np.float64)
+    expected = LOW + (HIGH - LOW) / (1 + np.exp(-latent))
+    assert np.allclose(np.array(tank.asked[-128:]), expected, rtol=1e-5, atol=1e-6)
+    assert latent.std() > 0.5  # not actions: σ starts at 1
+
+
+@pytest.mark.parametrize("algorithm", [PPO, A2C])
+def test_it_is_a_gaussian_behind_a_sigmoid(algorithm) -> None:
+    """Without an entropy bonus both have one trajectory of weights, up to the rounding of the Jacobian."""
+    ours = algorithm(LogitNormalPolicy, Tank(), ent_coef=0.0, **SMALL).learn(256)
+    theirs = algorithm("MlpPolicy", BehindSigmoid(), ent_coef=0.0, **SMALL).learn(256)
+    fresh = algorithm("MlpPolicy", BehindSigmoid(), ent_coef=0.0, **SMALL).policy.state_dict()
+    for name, weight in theirs.policy.state_dict().items():
+        moved = (weight - fresh[name]).abs().max()
+        assert moved > 1e-4
+        assert (ours.policy.state_dict()[name] - weight).abs().max() < 0.02 * moved, name
+
+
+def test_trpo_has_the_exact_divergence() -> None:
+    p, q = law([[0.7, -1.2]], [0.0, 0.5]), law([[0.1, 0.3]], [0.2, -0.5])
+    normals = [torch.distributions.Normal(d.distribution.loc, d.distribution.scale) for d in (p, q)]
+    expected = torch.distributions.kl_divergence(*normals)
+    assert torch.allclose(kl_divergence(p, q), expected)
+    before = TRPO(LogitNormalPolicy, Tank(), **SMALL).policy.state_dict()
+    model = TRPO(LogitNormalPolicy, Tank(), **SMALL).learn(128)
+    moved = (model.policy.state_dict()["action_net.weight"] - before["action_net.weight"]).abs().max()
+    assert moved > 0
+
+
+def test_deterministic_is_the_median_and_survives_the_disk(tmp_path) -> None:
+    model = PPO(LogitNormalPolicy, Tank(), **SMALL).learn(128)
+    obs = np.float32([[0.3, 0.5], [-1.0, 0.0]])
+    action, _ = model.predict(obs, deterministic=True)
+    samples = model.predict(np.repeat(obs, 4000, 0))[0].reshape(2, 4000, 2)
+    assert np.allclose((samples < action[:, None]).mean(1), 0.5, atol=0.04)
+    assert action.dtype == np.float32
+    model.save(tmp_path / "model")
+    again, _ = PPO.load(tmp_path / "model", device="cpu").predict(obs, deterministic=True)
+    assert np.array_equal(action, again)
+
+
+class Elsewhere(gymnasium.Env):
+    """A world with another action space."""
+
+    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    def __init__(self, action_space: spaces.Space) -> None:
+        self.action_space = action_space
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        spaces.Discrete(3),
+        spaces.Box(-1.0, 1.0, (2, 2)),
+    ],
+    ids=str,
+)
+def test_other_action_spaces_are_refused_with_the_fix(space: spaces.Space) -> None:
+    with pytest.raises(ValueError, match="wrap the environment"):
+        PPO(LogitNormalPolicy, Elsewhere(space), device="cpu")
+
+
+def test_its_noise_is_its_own() -> None:
+    with pytest.raises(ValueError, match="leave use_sde=False"):
+        PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")

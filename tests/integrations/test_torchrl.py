@@ -1,0 +1,151 @@
+"""The laws of the book in TorchRL: losses read latents, environments get actions, and TanhNormal is an old friend."""
+
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch import nn
+from torch.distributions import kl_divergence
+
+with warnings.catch_warnings():  # the library warns of its own deprecations while it is imported
+    warnings.simplefilter("ignore")
+    from tensordict import TensorDict
+    from torchrl.envs import GymWrapper
+    from torchrl.envs.utils import ExplorationType, set_exploration_type
+    from torchrl.modules import NormalParamExtractor, TanhNormal, ValueOperator
+    from torchrl.objectives import ClipPPOLoss
+
+from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
+from inbounds.integrations.torchrl import PARAMETERS, Latents, bounded_actor
+from tests.integrations.tank import HIGH, HORIZON, LOW, Tank
+
+LAWS = (LogitNormal, ScaledBeta)
+
+
+class BetaHead(nn.Module):
+    """α and β above one, as the book's Beta policies have them."""
+
+    def forward(self, outputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return tuple((1 + nn.functional.softplus(outputs)).chunk(2, -1))
+
+
+def network(law: type) -> nn.Module:
+    torch.manual_seed(0)
+    head = NormalParamExtractor() if law is LogitNormal else BetaHead()
+    return nn.Sequential(nn.Linear(2, 16), nn.Tanh(), nn.Linear(16, 4), head)
+
+
+def observations(number: int) -> TensorDict:
+    generator = torch.Generator().manual_seed(1)
+    return TensorDict(observation=torch.randn(number, 2, generator=generator), batch_size=[number])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_actor_scores_actions_and_the_environment_gets_them(law: type) -> None:
+    _, acting = bounded_actor(network(law), law, LOW, HIGH)
+    with torch.no_grad():
+        batch = acting(observations(500))
+    low, high = torch.from_numpy(LOW), torch.from_numpy(HIGH)
+    expected = low + (high - low) * torch.sigmoid(batch["latent"])
+    assert torch.allclose(batch["action"], expected, rtol=1e-5, atol=1e-5)
+    first, second = (batch[name].double() for name in PARAMETERS[law])
+    exact = law(first, second, low.double(), high.double(), validate_args=False)
+    action = exact.latent_to_value(batch["latent"].double())
+    assert torch.allclose(batch["latent_log_prob"].double(), exact.log_prob(action).sum(-1), atol=1e-3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_at_the_old_policy_the_loss_has_the_policy_gradient(law: type) -> None:
+    actor, acting = bounded_actor(network(law), law, LOW, HIGH)
+    critic = ValueOperator(nn.Linear(2, 1))
+    with torch.no_grad():
+        batch = acting(observations(64))
+    batch["advantage"] = torch.randn(64, 1, generator=torch.Generator().manual_seed(2))
+    batch["value_target"] = torch.zeros(64, 1)
+    loss = ClipPPOLoss(actor, critic, entropy_coeff=0.01)
+    found = loss(batch)
+    assert found["clip_fraction"].item() == 0
+    assert abs(found["kl_approx"].item()) < 1e-6
+    parameters = list(loss.actor_network_params.values(True, True))
+    gradient = torch.autograd.grad(found["loss_objective"], parameters)
+    log_prob = actor.get_dist(batch).log_prob(batch["latent"])
+    direct = torch.autograd.grad(-(batch["advantage"][:, 0] * log_prob).mean(), list(actor.parameters()))
+    assert sum(g.abs().sum() for g in direct) > 0
+    for ours, theirs in zip(sorted(gradient, key=_key), sorted(direct, key=_key), strict=True):
+        assert torch.allclose(ours, theirs, atol=1e-6)
+    entropy = actor.get_dist(batch).entropy().mean()  # exact: TorchRL need not sample for it
+    assert torch.allclose(found["entropy"], entropy, atol=1e-5)
+
+
+def _key(tensor: torch.Tensor) -> tuple:
+    return tuple(tensor.shape)
+
+
+@settings(deadline=None, max_examples=20)
+@given(loc=st.floats(-3, 3), log_std=st.floats(-2, 1), latent=st.floats(-6, 6))
+def test_torchrls_tanh_normal_is_the_logit_normal_of_twice_the_parameters(loc, log_std, latent) -> None:
+    mu, sigma = torch.tensor([loc], dtype=torch.float64), torch.tensor([log_std], dtype=torch.float64).exp()
+    low, high = (torch.tensor([float(bound[0])], dtype=torch.float64) for bound in (LOW, HIGH))
+    ours = LogitNormal(mu, sigma, low, high)
+    theirs = TanhNormal(mu / 2, sigma / 2, low=low, high=high)
+    action = ours.latent_to_value(torch.tensor([latent], dtype=torch.float64))
+    assert torch.allclose(theirs.log_prob(action), ours.log_prob(action).sum(), atol=1e-6)
+    assert torch.allclose(theirs.deterministic_sample, ours.median, atol=1e-9)
+
+
+def test_a_saturated_action_keeps_its_score_only_in_its_latent() -> None:
+    low, high = torch.from_numpy(LOW[:1]), torch.from_numpy(HIGH[:1])
+    loc = torch.tensor([18.0], requires_grad=True)
+    latents = Latents(LogitNormal(loc, torch.ones(1), low, high))
+    (score,) = torch.autograd.grad(latents.log_prob(torch.tensor([20.0])), loc)
+    assert score.item() == 2.0  # (z − μ)/σ²
+    peer = TanhNormal(loc / 2, torch.full((1,), 0.5), low=low, high=high)
+    action = latents.law.latent_to_value(torch.tensor([20.0])).detach()
+    (score,) = torch.autograd.grad(peer.log_prob(action), loc)
+    assert abs(score.item() - 2.0) > 0.5  # read back from the rounded action
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_rollout_in_a_batch_of_environments(law: type) -> None:
+    """Latents, actions in the box, and the *final* observation where an episode ends, not that of the reset."""
+    tanks = SyncVectorEnv(3 * [Tank], autoreset_mode=AutoresetMode.SAME_STEP)
+    env = GymWrapper(tanks)
+    env.set_seed(0)
+    _, acting = bounded_actor(network(law), law, LOW, HIGH)
+    with torch.no_grad():
+        batch = env.rollout(3 * HORIZON, acting, break_when_any_done=False)
+    asked = np.stack([tank.asked[-3 * HORIZON :] for tank in tanks.envs])
+    assert np.array_equal(batch["action"].numpy(), asked)
+    assert (asked > LOW).all()
+    assert (asked < HIGH).all()
+    over = batch["next", "truncated"][..., 0]
+    assert over.sum() == 9
+    assert not batch["next", "terminated"].any()
+    assert (batch["next", "observation"][over][:, 1] == 1).all()  # the clock at the end of an episode
+    assert (batch["observation"][:, HORIZON, 1] == 0).all()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_acting_without_noise(law: type) -> None:
+    actor, acting = bounded_actor(network(law), law, LOW, HIGH)
+    with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+        batch = acting(observations(5))
+    exact = actor.get_dist(batch).law
+    centre = exact.median if law is LogitNormal else exact.mean
+    assert torch.allclose(batch["action"], centre, atol=1e-4)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_divergence_is_exact(law: type) -> None:
+    first, second = torch.tensor([[1.5, 2.0]]), torch.tensor([[1.2, 3.0]])
+    p, q = (law(a, b, LOW, HIGH) for a, b in ((first, second), (second, first)))
+    assert torch.allclose(kl_divergence(Latents(p), Latents(q)), kl_divergence(p, q).sum(-1))
+
+
+def test_other_laws_are_refused() -> None:
+    with pytest.raises(ValueError, match="LogitNormal and ScaledBeta"):
+        bounded_actor(network(LogitNormal), ClippedNormal, LOW, HIGH)
