@@ -43,7 +43,8 @@ class OneStep:
     """One action on the box [-1, 1]: z ~ N(μ, σ²) is clipped to a and paid 1 - (a - peak)², less a baseline.
 
     The moments are those of one sample of (reward - share · mean reward) times a score, by Gauss–Legendre quadrature
-    on the three pieces of the real line; the scores are autograd's, of the Normal and of :class:`ClippedNormal`.
+    on the three pieces of the real line; the scores are autograd's, of the Normal and of
+    `ClippedNormal`.
     """
 
     mu: float

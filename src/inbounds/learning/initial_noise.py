@@ -30,7 +30,7 @@ def executed_std(family: str, scale: float) -> float:
         scale: σ of the latent Normal; for `beta`, α = β.
 
     Returns:
-        The standard deviation, in units of half the action range: below 1, where all mass is on the bounds.
+        The standard deviation, in units of half the action range; below 1, where all mass is on the bounds.
 
     Example:
         >>> [round(executed_std(f, 1.0), 4) for f in ("gaussian", "logit-normal", "beta")]
