@@ -16,6 +16,9 @@ REFERENCE_PAGES = {
     # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
     # every entry must have its own check (`test_every_erratum_is_checked`).
     "18_errata",
+    # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
+    # here the page must show every claim (`test_the_ledger_is_generated`).
+    "17_claims_ledger",
 }
 CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
 
@@ -98,6 +101,16 @@ def test_every_erratum_is_checked() -> None:
             assert "**Where.**" in prose, label
             assert "**Printed.**" in prose or "**Omitted.**" in prose, label
             assert "**Right.**" in prose or "**Why it matters.**" in prose, label
+
+
+def test_the_ledger_is_generated() -> None:
+    """The page shows the table of all claims, and says in words what a verdict is."""
+    cells = nbformat.read(ROOT / "notebooks" / "17_claims_ledger.ipynb", as_version=4).cells
+    code = [cell.source for cell in cells if cell.cell_type == "code"]
+    prose = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    assert any("study_pages.findings(outcomes)" in source for source in code)
+    assert any(source.strip() == "study_pages.ledger(found)" for source in code)
+    assert all(word in prose for word in ("**Supported**", "**Refuted**", "**Undecided**", "**missing**"))
 
 
 def small_notebook(folder: Path) -> nbformat.NotebookNode:

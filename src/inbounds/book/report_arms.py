@@ -48,25 +48,34 @@ def arm_section(outcomes: Outcomes, arm: str) -> list[str]:
         return [*parts, html.paragraph("missing: no cell of this arm is finished.", "missing")]
     for algorithm in ALGORITHMS:
         title = title_of(arm, algorithm)
-        columns = columns_of(arm, algorithm)
-        cells = {robot: {f: outcomes.find(c, robot) for f, c in columns.items()} for robot in ROBOTS}
+        cells = cells_of(outcomes, arm, algorithm)
         parts.append(html.heading(title, 3))
         if not any(outcome for row in cells.values() for outcome in row.values()):
             parts.append(html.paragraph("missing: none of these cells is finished.", "missing"))
             continue
-        parts += _curves(title, cells)
-        parts += _endpoints(title, cells)
-        parts += _differences(outcomes, arm, algorithm)
-        parts += _without_diverged(outcomes, arm, algorithm, cells)
-        parts.append(_diagnostics(title, cells))
-    return [*parts, *aggregates(outcomes, arm, TITLES[arm].partition(": ")[2]), *_ways(outcomes, arm)]
+        parts += curves(title, cells)
+        parts += endpoints(title, cells)
+        parts += differences(outcomes, arm, algorithm)
+        parts += without_diverged(outcomes, arm, algorithm, cells)
+        parts.append(diagnostics(title, cells))
+    parts += aggregates(outcomes, arm, TITLES[arm].partition(": ")[2])
+    acted = ways(outcomes, arm)
+    return [*parts, html.heading("Ways to act", 3), *acted] if acted else parts
 
 
 Cells = Mapping[str, Mapping[str, Outcome | None]]
 """By robot and family."""
 
 
-def _curves(title: str, cells: Cells) -> list[str]:
+def cells_of(outcomes: Outcomes, arm: str, algorithm: str) -> Cells:
+    """Return the cells that an arm compares under an algorithm."""
+    columns = columns_of(arm, algorithm)
+    return {robot: {f: outcomes.find(c, robot) for f, c in columns.items()} for robot in ROBOTS}
+
+
+def curves(title: str, cells: Cells) -> list[str]:
+    """Return the learning curves, a panel per robot."""
+
     def drawn(outcome: Outcome | None) -> Curve | None:
         band = analysis.curve(outcome) if outcome else None
         return Curve(outcome.steps, band) if outcome and band else None
@@ -88,7 +97,8 @@ def _final(outcome: Outcome | None) -> Estimate | None:
     return analysis.estimate(outcome, "final") if outcome else None
 
 
-def _endpoints(title: str, cells: Cells) -> list[str]:
+def endpoints(title: str, cells: Cells) -> list[str]:
+    """Return the final returns as a figure, and all endpoints as a table."""
     finals = {robot: {f: _final(o) for f, o in row.items()} for robot, row in cells.items()}
     fig = interval_panels(
         finals, xlabel="final return: mean of training returns over the last 10 % of epochs"
@@ -109,9 +119,8 @@ def _endpoints(title: str, cells: Cells) -> list[str]:
     return [html.figure(fig, alt, ""), html.table(caption, head, rows, words=(0, 1))]
 
 
-def _differences(
-    outcomes: Outcomes, arm: str, algorithm: str, *, without_diverged: bool = False
-) -> list[str]:
+def differences(outcomes: Outcomes, arm: str, algorithm: str, *, without_diverged: bool = False) -> list[str]:
+    """Return the differences between families: final returns as a figure, all endpoints as a table with tests."""
     contrasts = [c for c in CONTRASTS if (c.arm, c.algorithm) == (arm, algorithm)]
     found = {
         endpoint: {
@@ -153,7 +162,7 @@ def _row(comparisons: Sequence[Comparison]) -> list[str]:
     ]
 
 
-def _without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells) -> list[str]:
+def without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells) -> list[str]:
     """Repeat the analysis without the seeds that diverged, if any did."""
     gone = sum(int(o.diverged.sum()) for row in cells.values() for o in row.values() if o)
     if not gone:
@@ -176,7 +185,7 @@ def _without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells
     return [
         html.paragraph(said),
         means,
-        *_differences(outcomes, arm, algorithm, without_diverged=True),
+        *differences(outcomes, arm, algorithm, without_diverged=True),
     ]
 
 
@@ -189,7 +198,8 @@ _DIAGNOSTICS: Mapping[str, str] = {
 }
 
 
-def _diagnostics(title: str, cells: Cells) -> str:
+def diagnostics(title: str, cells: Cells) -> str:
+    """Return the table of what happened inside."""
     head = ["robot", "family", *_DIAGNOSTICS.values(), "at a clamp"]
     rows = []
     for robot, row in cells.items():
@@ -211,21 +221,19 @@ def _first_and_last(values: np.ndarray) -> str:
     return " → ".join(f"{np.nanmedian(x):.3g}" if np.isfinite(x).any() else "–" for x in (first, last))
 
 
-def _ways(outcomes: Outcomes, arm: str) -> list[str]:
+def ways(outcomes: Outcomes, arm: str) -> list[str]:
+    """Return the table of final policies by way to act; empty where none were kept."""
     kept = [outcomes.finished[c.id] for c in ARMS[arm] if c.id in outcomes.finished]
     kept = [outcome for outcome in kept if outcome.ways]
     if not kept:
         return []
-    ways = list(dict.fromkeys(way for outcome in kept for way in outcome.ways))
+    names = list(dict.fromkeys(way for outcome in kept for way in outcome.ways))
     rows = [
         [o.cell.robot, o.cell.algorithm.upper(), FAMILIES[o.cell.family].label]
-        + [spoken(analysis.by_way(o).get(way)) for way in ways]
+        + [spoken(analysis.by_way(o).get(way)) for way in names]
         for o in kept
     ]
     caption = (
         "Final policies by way to act: mean return of ten episodes per seed from the same starts, over seeds."
     )
-    return [
-        html.heading("Ways to act", 3),
-        html.table(caption, ["robot", "algorithm", "family", *ways], rows, (0, 1, 2)),
-    ]
+    return [html.table(caption, ["robot", "algorithm", "family", *names], rows, (0, 1, 2))]

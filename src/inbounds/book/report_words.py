@@ -1,57 +1,16 @@
-"""Numbers of the study's report in words."""
+"""What the study's report calls things: pairs of families, and the values of a figure for those who cannot see it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
-import numpy as np
+from collections.abc import Mapping
 
 from inbounds.book.figures import FAMILIES
 from inbounds.book.study_figures import SHORT
 from inbounds.study.analysis import Contrast
-from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.statistics import Estimate
+from inbounds.study.words import number, p_value, spoken, verdict
 
-
-def spoken(estimate: Estimate | None, digits: int | None = None) -> str:
-    """Say an estimate with its interval.
-
-    Example:
-        >>> spoken(Estimate(np.array(12.34), np.array(9.0), np.array(15.0), 10, 0, 0.95, "mean"))
-        '12.3 [9.0, 15.0]'
-    """
-    if estimate is None:
-        return "missing"
-    write: Callable[..., str] = number if digits is None else lambda x: f"{float(x):.{digits}f}"
-    return f"{write(estimate.value)} [{write(estimate.low)}, {write(estimate.high)}]"
-
-
-def number(value: float | np.ndarray) -> str:
-    """Say a return, with a decimal where it is small."""
-    said = f"{float(value):.0f}" if abs(float(value)) >= 100 else f"{float(value):.1f}"
-    return said.replace("-", "−")
-
-
-def p_value(p: float) -> str:
-    """Say a p-value."""
-    return "" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
-
-
-def verdict(comparison: Comparison, level: float = 1 - LEVEL) -> str:
-    """Say in a word what a comparison shows.
-
-    Example:
-        >>> verdict(Comparison(None, float("nan"), float("nan")))
-        ''
-    """
-    gap = comparison.difference
-    if gap is None:
-        return ""
-    if gap.low <= 0 <= gap.high:
-        return "unresolved"
-    if comparison.p_adjusted < level:
-        return "higher" if gap.value > 0 else "lower"
-    return "not after Holm"
+__all__ = ["in_words", "number", "p_value", "pair_name", "spoken", "verdict"]
 
 
 def pair_name(contrast: Contrast) -> str:

@@ -17,13 +17,13 @@ import json
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
 
 from inbounds.book import alt_text
 from inbounds.book.report_page import bullets, paragraph, table
+from inbounds.book.shown import Shown
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py
 RESULTS = ROOT / "benchmarks" / "results"
@@ -59,21 +59,6 @@ VALIDATION_ALT = (
     "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, "
     "a solid line, and of stable-baselines3, a dashed line."
 )
-
-
-@dataclass(frozen=True)
-class Shown:
-    """Something that a page shows as HTML, and whose text form only says what it is."""
-
-    what: str
-    """In a few words, without numbers."""
-    html: str
-
-    def __repr__(self) -> str:
-        return f"<{self.what}>"
-
-    def _repr_html_(self) -> str:
-        return f'<div style="overflow-x:auto">{self.html}</div>'
 
 
 def read_speed(folder: Path = RESULTS) -> Results | None:

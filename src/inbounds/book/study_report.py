@@ -13,12 +13,14 @@ from pathlib import Path
 from inbounds.book import report_page as html
 from inbounds.book.figures import FAMILIES
 from inbounds.book.report_arms import HEADS, TITLES, arm_section
+from inbounds.book.report_ledger import ledger_section
 from inbounds.book.report_words import spoken
 from inbounds.book.study_figures import interval_panels
 from inbounds.learning.files import write_whole
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
 from inbounds.study.grid import ARMS, ROBOTS, STUDY_VERSION, Cell
+from inbounds.study.ledger import CLAIMS, judge
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate
 from inbounds.study.statistics.settings import LEVEL, RESAMPLES
@@ -47,17 +49,23 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
     Returns:
         The path.
     """
-    sections = [("state", "What there is"), *TITLES.items(), ("provenance", "Provenance")]
+    sections = [("state", "What there is"), *TITLES.items(), ("claims", "Claims of the source thesis")]
+    sections.append(("provenance", "Provenance"))
     parts = [
         html.paragraph(f"Study version {STUDY_VERSION}. {_count(outcomes)}"),
         html.contents(sections),
         html.heading("How to read it", 3),
         html.bullets(HOW_TO_READ),
-        *_state(outcomes),
+        html.heading("What there is", 2, "state"),
+        *state_section(outcomes),
     ]
     for arm in TITLES:
         parts += _mechanisms(outcomes) if arm == "mechanisms" else arm_section(outcomes, arm)
-    parts += _provenance(outcomes)
+    parts += [
+        html.heading("Claims of the source thesis", 2, "claims"),
+        *ledger_section([judge(outcomes, c) for c in CLAIMS]),
+    ]
+    parts += [html.heading("Provenance", 2, "provenance"), *provenance_section(outcomes)]
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, html.page("In Bounds: the study", parts).encode())
     return path
@@ -67,13 +75,13 @@ def _count(outcomes: Outcomes) -> str:
     return f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
 
 
-def _state(outcomes: Outcomes) -> list[str]:
+def state_section(outcomes: Outcomes) -> list[str]:
+    """Return which cells are finished."""
     rows = []
     for arm, cells in ARMS.items():
         counts = [Counter(outcomes.states.get(c.id) for c in cells if c.robot == robot) for robot in ROBOTS]
         rows.append([TITLES[arm], *(f"{c['finished']} of {c.total()}" if c.total() else "–" for c in counts)])
-    parts = [html.heading("What there is", 2, "state")]
-    parts.append(html.table("Finished cells of those planned, per robot.", ["arm", *ROBOTS], rows))
+    parts = [html.table("Finished cells of those planned, per robot.", ["arm", *ROBOTS], rows)]
     wrong = [
         f"{name}: {state}" for name, state in outcomes.states.items() if state not in ("finished", "missing")
     ]
@@ -102,14 +110,21 @@ def _mechanisms(outcomes: Outcomes) -> list[str]:
     )
     parts.append(html.paragraph(said))
     for word, title in GROUPS.items():
-        cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
-        parts.append(html.heading(title, 3))
-        found = [outcomes.finished[cell.id] for cell in cells if cell.id in outcomes.finished]
-        if not found:
-            parts.append(html.paragraph("missing: none of these cells is finished.", "missing"))
-            continue
-        parts += _changes(outcomes, title, cells)
+        parts += [html.heading(title, 3), *changes(outcomes, word)]
     return parts
+
+
+def changes(outcomes: Outcomes, word: str) -> list[str]:
+    """Return what one group of the fourth arm's variants changes, as a figure and a table.
+
+    Args:
+        outcomes: what there is of the study.
+        word: a key of `GROUPS`.
+    """
+    cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
+    if not any(cell.id in outcomes.finished for cell in cells):
+        return [html.paragraph("missing: none of these cells is finished.", "missing")]
+    return _changes(outcomes, GROUPS[word], cells)
 
 
 def _changes(outcomes: Outcomes, title: str, cells: list[Cell]) -> list[str]:
@@ -139,19 +154,18 @@ def _panel(cell: Cell) -> str:
 # ---- provenance
 
 
-def _provenance(outcomes: Outcomes) -> list[str]:
-    parts = [html.heading("Provenance", 2, "provenance")]
+def provenance_section(outcomes: Outcomes) -> list[str]:
+    """Return what the finished cells ran on, and what they cost."""
     if not outcomes.finished:
-        return [*parts, html.paragraph("missing: no cell is finished.", "missing")]
+        return [html.paragraph("missing: no cell is finished.", "missing")]
     sessions = Counter(
         _session(session) for o in outcomes.finished.values() for session in o.metadata["sessions"]
     )
     rows = [[str(count), *key] for key, count in sessions.items()]
     head = ["sessions", "commit", "engine", "versions", "processor"]
     caption = "What the parts of the cells ran on; + after a commit: the engine differed from it."
-    parts.append(html.table(caption, head, rows, (1, 2, 3, 4)))
-    parts.append(html.paragraph(_cost(list(outcomes.finished.values()))))
-    return parts
+    cost = html.paragraph(_cost(list(outcomes.finished.values())))
+    return [html.table(caption, head, rows, (1, 2, 3, 4)), cost]
 
 
 def _session(session: dict[str, object]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""`inbounds study run | resume | status | report | verify`: what the words of the command line do."""
+"""`inbounds study run | resume | status | report | ledger | verify`: what the words of the command line do."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tyro.conf import Positional, arg, subcommand
 
 from inbounds.study.cell_run import StudyError
 from inbounds.study.grid import Cell, select
+from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.progress import StudyProgress, cell_status, status_table
 from inbounds.study.run import Settings, run_study
@@ -74,6 +75,18 @@ class Report(_Where):
 
 
 @dataclass(frozen=True)
+class Ledger:
+    """Print what the finished cells say to claims of the source thesis, statement by statement."""
+
+    claims: Annotated[Positional[tuple[str, ...]], arg(metavar="[CLAIM ...]")] = ()
+    """Which, by their names in the ledger; by default all."""
+    results: Path = StudyFolder.results
+    """Folder of the results."""
+    work: Path = StudyFolder.work
+    """Folder of claims and checkpoints."""
+
+
+@dataclass(frozen=True)
 class Verify(_Where):
     """Check the sums of all results, and run the first epochs of some cells again."""
 
@@ -87,12 +100,13 @@ class Verify(_Where):
     """Of that choice."""
 
 
-StudyCommand: TypeAlias = Run | Resume | Status | Report | Verify
+StudyCommand: TypeAlias = Run | Resume | Status | Report | Ledger | Verify
 COMMANDS: dict[str, type[StudyCommand]] = {
     "run": Run,
     "resume": Resume,
     "status": Status,
     "report": Report,
+    "ledger": Ledger,
     "verify": Verify,
 }
 
@@ -129,6 +143,8 @@ def study(args: Sequence[str]) -> int:
     )
     console = Console(highlight=False, force_jupyter=False)
     try:
+        if isinstance(command, Ledger):
+            return _ledger(command, console)
         cells = command.chosen()
         if isinstance(command, Run):
             return _run(command, cells, console)
@@ -178,6 +194,25 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
     console.print(f"{len(outcomes.finished)} of {len(cells)} cells are finished", markup=False)
     console.print(f"report: {path}", markup=False, soft_wrap=True)
+    return 0
+
+
+def _ledger(command: Ledger, console: Console) -> int:
+    chosen = claims_named(command.claims)
+    outcomes = Outcomes.read(StudyFolder(command.results, command.work))
+    for claim in chosen:
+        found = judge(outcomes, claim)
+        lines = [
+            f"{claim.id}: {found.verdict} ({found.counted})",
+            f"  {claim.says} ({claim.where})",
+            f"  {claim.test}",
+        ]
+        lines += [f"    {statement}" for statement in found.statements]
+        if found.finished < found.planned:
+            lines.append(
+                f"  {found.cells} cells are finished; the others: inbounds study run {' '.join(claim.cells)}"
+            )
+        console.print("\n".join(lines), markup=False, soft_wrap=True)
     return 0
 
 

@@ -1,0 +1,60 @@
+"""The claims of the source thesis in the study's report: one table, every number from the finished cells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from inbounds.book import report_page as html
+from inbounds.study.ledger import Finding
+from inbounds.study.statistics.settings import LEVEL
+
+HEAD = ("claim", "where", "verdict", "test", "result", "finished cells", "command")
+_CAPTION = (
+    f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
+    "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible. Moot: there is "
+    "nothing to explain."
+)
+
+
+def ledger_section(found: Sequence[Finding]) -> list[str]:
+    """Return the count of verdicts and the table of claims.
+
+    Args:
+        found: in the order of the table.
+    """
+    rows = [
+        [
+            each.claim.says,
+            each.claim.where,
+            each.verdict,
+            each.claim.test,
+            f"{each.counted}. {each.told}",
+            each.cells,
+            each.claim.command,
+        ]
+        for each in found
+    ]
+    return [html.paragraph(counted(found)), html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))]
+
+
+def counted(found: Sequence[Finding]) -> str:
+    """Say how many claims have which verdict.
+
+    Example:
+        >>> counted([])
+        '0 claims: 0 supported, 0 refuted, 0 undecided.'
+    """
+    verdicts = Counter(each.verdict for each in found)
+    told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in ("supported", "refuted", "undecided"))
+    return f"{len(found)} claims: {told}."
+
+
+def decided(found: Sequence[Finding]) -> list[str]:
+    """Return the claims that are decided, as a list; a paragraph where none is."""
+    told = [
+        f"{each.verdict.capitalize()}: {each.claim.says} ({each.told})"
+        for each in found
+        if each.verdict != "undecided"
+    ]
+    return [html.bullets(told) if told else html.paragraph("No claim is decided yet.", "missing")]

@@ -1,0 +1,134 @@
+"""The study as the book shows it: the parts of `inbounds study report`, one at a time.
+
+    outcomes = study_pages.shipped()
+    study_pages.curves(outcomes, "printed", "ppo")
+
+The text form of what is shown holds no number: a stored notebook stays the same when another cell arrives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from inbounds.book import report_arms, report_ledger, study_report
+from inbounds.book import report_page as html
+from inbounds.book.report_aggregates import aggregates
+from inbounds.book.report_arms import Cells
+from inbounds.book.shown import Shown
+from inbounds.study.ledger import CLAIMS, Finding, judge
+from inbounds.study.outcomes import Outcomes
+from inbounds.study.store import StudyFolder
+
+ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/study_pages.py
+
+
+def shipped(root: Path = ROOT) -> Outcomes:
+    """Read the study that the project ships; each file is compared with its checksum.
+
+    Args:
+        root: of the source tree.
+
+    Raises:
+        FileNotFoundError: there are no results: the package was installed without its source tree.
+    """
+    if not (root / "results" / "PROTOCOL.md").is_file():
+        raise FileNotFoundError(
+            "the study is not part of the installed package: clone the project, and `pip install -e .` in it"
+        )
+    return Outcomes.read(StudyFolder(root / "results", root / "runs" / "study"))
+
+
+def state(outcomes: Outcomes) -> Shown:
+    """Return which cells are finished."""
+    return _shown("study: finished cells", study_report.state_section(outcomes))
+
+
+def provenance(outcomes: Outcomes) -> Shown:
+    """Return what the finished cells ran on, and what they cost."""
+    return _shown("study: provenance", study_report.provenance_section(outcomes))
+
+
+def curves(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
+    """Return the learning curves of an arm under an algorithm, a panel per robot."""
+    return _of_arm("learning curves", outcomes, arm, algorithm, report_arms.curves)
+
+
+def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
+    """Return final returns as a figure, and all endpoints as a table."""
+    return _of_arm("endpoints", outcomes, arm, algorithm, report_arms.endpoints)
+
+
+def differences(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
+    """Return the differences between families: final returns as a figure, all endpoints as a table with tests."""
+    parts = report_arms.differences(outcomes, arm, algorithm)
+    parts += report_arms.without_diverged(
+        outcomes, arm, algorithm, report_arms.cells_of(outcomes, arm, algorithm)
+    )
+    return _shown(f"study: differences, {report_arms.title_of(arm, algorithm)}", parts)
+
+
+def inside(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
+    """Return the table of what happened inside: noise, saturation, clamps, KL, entropy."""
+    title, cells = report_arms.title_of(arm, algorithm), report_arms.cells_of(outcomes, arm, algorithm)
+    return _shown(f"study: inside, {title}", [report_arms.diagnostics(title, cells)])
+
+
+def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
+    """Return IQM, probability of improvement and profiles over all robots."""
+    title = report_arms.TITLES[arm].partition(": ")[2]
+    return _shown(f"study: over all robots, {title}", aggregates(outcomes, arm, title)[1:])
+
+
+def ways(outcomes: Outcomes) -> Shown:
+    """Return the returns of the final policies by way to act."""
+    found = report_arms.ways(outcomes, "standard")
+    return _shown("study: ways to act", found or [html.paragraph("missing: no cell is finished.", "missing")])
+
+
+def changes(outcomes: Outcomes, word: str) -> Shown:
+    """Return what a group of the fourth arm's variants changes; `word` is a key of `study_report.GROUPS`."""
+    return _shown(
+        f"study: what changes, {study_report.GROUPS[word].lower()}", study_report.changes(outcomes, word)
+    )
+
+
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """Judge all claims of the source thesis."""
+    return [judge(outcomes, claim) for claim in CLAIMS]
+
+
+def ledger(found: list[Finding]) -> Shown:
+    """Return the table of claims."""
+    return _shown("study: the ledger", report_ledger.ledger_section(found))
+
+
+def decided(found: list[Finding]) -> Shown:
+    """Return the claims that are decided, with their numbers."""
+    return _shown("study: what is decided", report_ledger.decided(found))
+
+
+def verdict_of(finding: Finding) -> str:
+    """Say a claim's verdict in a sentence that stays true when cells arrive.
+
+    Args:
+        finding: of the claim.
+    """
+    if finding.verdict == "undecided" and finding.finished < finding.planned:
+        return f"undecided: {finding.cells} cells are finished"
+    return f"{finding.verdict} ({finding.counted})"
+
+
+def _of_arm(
+    what: str, outcomes: Outcomes, arm: str, algorithm: str, parts: Callable[[str, Cells], list[str]]
+) -> Shown:
+    title = report_arms.title_of(arm, algorithm)
+    cells = report_arms.cells_of(outcomes, arm, algorithm)
+    if not any(outcome for row in cells.values() for outcome in row.values()):
+        lacking = [html.paragraph("missing: none of these cells is finished.", "missing")]
+        return _shown(f"study: {what}, {title}", lacking)
+    return _shown(f"study: {what}, {title}", parts(title, cells))
+
+
+def _shown(what: str, parts: list[str]) -> Shown:
+    return Shown(what, "\n".join(parts))

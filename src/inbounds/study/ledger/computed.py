@@ -1,0 +1,155 @@
+"""Evidence that needs no cell: claims of mathematics and of cost, computed where they are asked for.
+
+Exact numbers are errors of computing; those that depend on drawn seeds come with an interval over seeds.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from scipy import integrate
+from scipy.special import expit, logit
+
+from inbounds.distributions import LogitNormal
+from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, Trainer, preset, trpo
+from inbounds.learning.training import one_thread
+from inbounds.study.analysis import generator_for
+from inbounds.study.ledger.evidence import combination, side
+from inbounds.study.ledger.verdicts import Evidence, State, Statement
+from inbounds.study.outcomes import Floats, Outcomes
+from inbounds.study.statistics import Estimate
+from inbounds.study.statistics.settings import LEVEL
+
+EXACT = 1e-6
+"""Relative error below which two ways to compute one number agree."""
+_SEEDS, _STATES = 5, 128
+_CASES = ((0.0, 1.0, 0.3, 0.8), (-1.5, 0.5, 0.5, 1.6), (2.0, 2.5, -1.0, 0.7))  # μ, σ of P, then of Q
+
+
+def agrees(about: str, error: Callable[[], float], *, claimed: bool) -> Evidence:
+    """Two ways to compute a number agree to `EXACT`.
+
+    `claimed`: the claim is that they do, else that it cannot be computed.
+    """
+
+    def find(_: Outcomes) -> list[Statement]:
+        off = np.asarray(error())
+        state: State = "for" if bool(off < EXACT) == claimed else "against"
+        return [Statement(about, state, Estimate(off, off, off, 1, 0, LEVEL, "relative error"), exact=True)]
+
+    return find
+
+
+def error_of_closed_kl() -> float:
+    """Return the relative error of the Normals' KL as that of logit-normals, against quadrature over actions."""
+    errors = []
+    for loc, scale, loc_q, scale_q in _CASES:
+        p, q = (_law(m, s) for m, s in ((loc, scale), (loc_q, scale_q)))
+
+        def integrand(z: float, p: LogitNormal = p, q: LogitNormal = q) -> float:
+            a = torch.tensor(z, dtype=torch.float64).sigmoid()
+            slope = (a * (1 - a)).item()  # of the action by z: the integral runs over actions
+            return float(p.log_prob(a).exp() * (p.log_prob(a) - q.log_prob(a))) * slope
+
+        ends = loc - 8 * scale, loc + 8 * scale
+        measured, _ = integrate.quad(integrand, *ends, limit=400, epsabs=1e-12, epsrel=1e-10)
+        closed = np.log(scale_q / scale) + (scale**2 + (loc - loc_q) ** 2) / (2 * scale_q**2) - 0.5
+        errors.append(abs(measured / closed - 1))
+    return max(errors)
+
+
+def error_of_beta_fisher() -> float:
+    """Return the relative error of vᵀFv of a Beta policy: TRPO's product against the trigamma functions.
+
+    The Fisher matrix of a Beta is diag(ψ′(α), ψ′(β)) − ψ′(α + β); along v the outputs move by their
+    differences.
+    """
+    generator = torch.Generator().manual_seed(0)
+    policy = Policy(PolicyConfig("beta"), low=-np.ones(2), high=np.ones(2))
+    networks = ActorCritic(policy, 3, NetworkConfig(policy_head_gain=1.0, dtype="float64"), [generator])
+    obs = torch.randn(1, 64, 3, generator=generator, dtype=torch.float64)
+    theta, v = (
+        networks.actor.theta,
+        torch.randn(networks.actor.theta.shape, generator=generator, dtype=torch.float64),
+    )
+    product = (trpo.kl_hessian_product(networks, obs)(v) * v).sum()
+    with torch.no_grad():
+        here, sides = networks.parameters(obs), []
+        for step in (1e-5, -2e-5):
+            theta += step * v
+            sides.append(networks.parameters(obs))
+    along = [(up - down) / 2e-5 for up, down in zip(*sides, strict=True)]
+    own = sum(torch.polygamma(1, x) * d**2 for x, d in zip(here, along, strict=True))
+    shared = torch.polygamma(1, here.first + here.second) * sum(along) ** 2
+    return abs(product.item() / ((own - shared).sum() / obs.shape[1]).item() - 1)
+
+
+def error_of_centres() -> float:
+    """Return the relative error of the logit-normal's mean and mode, against quadrature and the density's slope."""
+    errors = []
+    for loc, scale in ((0.4, 0.5), (1.0, 1.4), (-2.0, 2.5)):
+        law = _law(loc, scale)
+
+        def weighted(t: float, loc: float = loc, scale: float = scale) -> float:
+            return float(expit(loc + scale * t) * np.exp(-(t**2) / 2) / np.sqrt(2 * np.pi))
+
+        mean, _ = integrate.quad(weighted, -9, 9, epsabs=1e-13, epsrel=1e-12, limit=400)
+        z = logit(law.mode.item())
+        errors += [abs(law.mean.item() / mean - 1), abs((loc + scale**2 * np.tanh(z / 2)) / z - 1)]
+    return max(errors)
+
+
+def _law(loc: float, scale: float) -> LogitNormal:
+    return LogitNormal(
+        torch.tensor(loc, dtype=torch.float64), torch.tensor(scale, dtype=torch.float64), 0.0, 1.0
+    )
+
+
+def sampled_error(_: Outcomes) -> list[Statement]:
+    """The sampled Fisher-vector product is off: its relative error, over seeds. For: above 0."""
+    error = _over(_fisher_routes()[0], "error")
+    return [Statement("relative error of the sampled product", side(error), error, digits=3)]
+
+
+def sampled_time(_: Outcomes) -> list[Statement]:
+    """The sampled product takes longer: processor time over that of the closed form, over repeats. For: above 1."""
+    ratio = _over(_fisher_routes()[1], "ratio")
+    return [
+        Statement("its processor time over that of the closed form", side(ratio, 1, 1.0), ratio, digits=2)
+    ]
+
+
+@functools.cache
+def _fisher_routes() -> tuple[Floats, Floats]:
+    """Relative error of the sampled product of each seed, and the ratios of the times."""
+    with one_thread():
+        config = preset("common", "Swimmer-v5", policy="logit-normal", algo="trpo", seeds=_SEEDS, epochs=1)
+        trainer = Trainer(config)
+        rollout = trainer.collector.collect(_STATES)
+        networks, generator = trainer.networks, torch.Generator().manual_seed(0)
+        vector = torch.randn(networks.actor.theta.shape, generator=generator)
+        routes = (
+            lambda: trpo.kl_hessian_product(networks, rollout.obs),
+            lambda: trpo.sampled_fisher_product(networks, rollout.obs, rollout.latent),
+        )
+        exact, sampled = (route()(vector) for route in routes)
+        error = ((sampled - exact).norm(dim=1) / exact.norm(dim=1)).double().numpy()
+        ratio = np.array([_seconds(routes[1], vector) / _seconds(routes[0], vector) for _ in range(4)])
+    return error, ratio
+
+
+def _over(values: Floats, name: str) -> Estimate:
+    return combination([values], [1], generator_for("ledger", "fisher", name))
+
+
+def _seconds(route: Callable[[], trpo.Product], vector: torch.Tensor) -> float:
+    """Processor time of the eleven products of an update, preparation included."""
+    before = time.process_time()
+    product = route()
+    for _ in range(11):
+        product(vector)
+    return time.process_time() - before

@@ -1,0 +1,320 @@
+"""Kinds of evidence: from finished cells to statements for a claim, against it, or open.
+
+Each function takes what it is about and returns what `Claim` wants: a function of the outcomes. Differences of two
+families on the six robots carry the protocol's test with Holm's correction, and count only where it agrees with the
+interval. Everything else has an interval per statement, uncorrected, as the protocol has it for the fourth arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from inbounds.study import analysis, statistics
+from inbounds.study.analysis import Contrast, generator_for
+from inbounds.study.grid import ROBOTS, Cell, select
+from inbounds.study.ledger.verdicts import Evidence, State, Statement
+from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
+from inbounds.study.statistics import Comparison, Estimate
+from inbounds.study.statistics.intervals import check_bootstrap, limits, resample
+from inbounds.study.statistics.settings import LEVEL, RESAMPLES
+from inbounds.study.words import verdict
+
+MARGIN = 0.1
+"""The smallest difference that matters, as a share of what PPO × gaussian of arm 1 learns on the robot."""
+START = "start"
+"""The return of the first epoch, which the untrained policy earns; no endpoint of the protocol."""
+
+
+def seeds_of(outcome: Outcome, endpoint: str) -> Floats:
+    """Return an endpoint of `analysis.ENDPOINTS`, or the `START`, of each seed `[S]`; NaN where it is missing."""
+    return outcome.returns[:, 0] if endpoint == START else analysis.scores(outcome, endpoint)
+
+
+def groups_of(outcomes: Outcomes, places: Sequence[tuple[Column, str]], endpoint: str) -> list[Floats] | None:
+    """Return an endpoint's seeds of several cells, None unless all are finished and have two seeds that count."""
+    cells = [outcomes.find(column, robot) for column, robot in places]
+    groups = [seeds_of(cell, endpoint) for cell in cells if cell is not None]
+    return groups if len(groups) == len(places) and all(np.isfinite(x).sum() > 1 for x in groups) else None
+
+
+def combination(groups: Sequence[Floats], weights: Sequence[float], rng: np.random.Generator) -> Estimate:
+    """Estimate Σ weight · mean over independent groups of seeds, with the protocol's kind of interval.
+
+    Args:
+        groups: `[S]` each; seeds without a finite number are left out and counted.
+        weights: one per group.
+        rng: source of the resamples.
+
+    Returns:
+        The estimate, with the degrees of freedom of Welch (1947); for weights 1 and −1 that of
+        `statistics.difference`.
+
+    Example:
+        >>> groups = [np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 4.0])]
+        >>> combination(groups, [1.0, -0.5], np.random.default_rng(0)).value.item()
+        1.0
+    """
+    check_bootstrap(LEVEL, RESAMPLES, "expanded")
+    found = [statistics.seeds.finite_seeds(group, "exclude") for group in groups]
+    kept, lost = [each for each, _ in found], sum(gone for _, gone in found)
+    drawn = [resample(x, "mean", rng.integers(len(x), size=(RESAMPLES, len(x)))) for x in kept]
+    replicates = sum((w * each for w, each in zip(weights, drawn, strict=True)), start=np.zeros(RESAMPLES))
+    parts = np.array([w**2 * x.var(ddof=1) / len(x) for w, x in zip(weights, kept, strict=True)])
+    sizes = np.array([len(x) for x in kept])
+    freedom = (
+        parts.sum() ** 2 / (parts**2 / (sizes - 1)).sum() if parts.sum() else float(sizes.sum() - len(kept))
+    )
+    low, high = limits(replicates, LEVEL, "expanded", int(sizes.min()), freedom)
+    value = np.asarray(sum(w * x.mean() for w, x in zip(weights, kept, strict=True)))
+    return Estimate(value, low, high, int(sizes.min()), lost, LEVEL, "difference of means")
+
+
+def side(estimate: Estimate, sign: int = 1, edge: float = 0.0) -> State:
+    """Say on which side of an edge an interval lies, for a claim that it is above (sign 1) or below (−1)."""
+    if sign * (float(estimate.low if sign > 0 else estimate.high) - edge) > 0:
+        return "for"
+    return "against" if sign * (float(estimate.high if sign > 0 else estimate.low) - edge) < 0 else "open"
+
+
+def beats(
+    contrast: Contrast, endpoint: str = "final", robots: Sequence[str] = ROBOTS, *, below: Sequence[str] = ()
+) -> Evidence:
+    """The first family is ahead of the second on some robots, and behind on others.
+
+    For: the interval of the difference leaves out 0 on that side, and the test finds it after Holm.
+    Against: the same, other side.
+
+    Args:
+        contrast: the families.
+        endpoint: a key of `analysis.ENDPOINTS`, or `START`.
+        robots: on which the claim puts it ahead.
+        below: on which the claim puts it behind.
+    """
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        rows = _compared(outcomes, contrast, endpoint)
+        return [
+            _of_comparison(_about(contrast, robot), rows[robot], -1 if robot in below else 1)
+            for robot in ROBOTS
+            if robot in (*robots, *below)
+        ]
+
+    return find
+
+
+def _about(contrast: Contrast, robot: str) -> str:
+    return f"{robot}, {contrast.algorithm.upper()}, {contrast.first} − {contrast.second}"
+
+
+def _compared(outcomes: Outcomes, contrast: Contrast, endpoint: str) -> dict[str, Comparison]:
+    if endpoint != START:
+        return analysis.differences(outcomes, contrast, endpoint)
+    first, second = (
+        {robot: seeds_of(o, START) for robot in ROBOTS if (o := outcomes.find(column, robot)) is not None}
+        for column in contrast.columns
+    )
+    rng = generator_for("difference", *contrast, START)
+    return statistics.compare(first, second, rng, environments=ROBOTS, statistic="mean", missing="exclude")
+
+
+def _of_comparison(about: str, row: Comparison, sign: int) -> Statement:
+    if row.difference is None:
+        return Statement(about, "missing")
+    said: Mapping[str, State] = (
+        {"higher": "for", "lower": "against"} if sign > 0 else {"higher": "against", "lower": "for"}
+    )
+    return Statement(about, said.get(verdict(row), "open"), row.difference, row.p_adjusted)
+
+
+def margin(outcomes: Outcomes, robot: str) -> float | None:
+    """Return the smallest difference that matters on a robot, None while the reference is not finished."""
+    known = analysis.references(outcomes).get(robot)
+    return None if known is None or known[1] <= known[0] else MARGIN * (known[1] - known[0])
+
+
+def equals(contrast: Contrast, robots: Sequence[str], endpoint: str = "final") -> Evidence:
+    """Two families differ by less than the margin. For: all of the interval is within ±margin; against: none."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        rows, found = analysis.differences(outcomes, contrast, endpoint), []
+        for robot in robots:
+            about, gap = _about(contrast, robot), rows[robot].difference
+            edge = margin(outcomes, robot)
+            if gap is None or edge is None:
+                found.append(Statement(about, "missing"))
+                continue
+            apart = gap.low > edge or gap.high < -edge
+            within = -edge < gap.low and gap.high < edge
+            state: State = "for" if within else "against" if apart else "open"
+            found.append(Statement(f"{about} (margin ±{edge:.0f})", state, gap))
+        return found
+
+    return find
+
+
+def half_remains(
+    now: tuple[Column, Column], before: tuple[Column, Column], robots: Sequence[str], endpoint: str
+) -> Evidence:
+    """Of a gap between two columns, at least half is left where something else has been changed.
+
+    The number is (gap now) − ½ (gap before). For: above 0; against: below; moot: the gap before is not
+    clearly above 0.
+    """
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for robot in robots:
+            groups = groups_of(outcomes, [(column, robot) for column in (*now, *before)], endpoint)
+            if groups is None:
+                found.append(Statement(robot, "missing"))
+                continue
+            name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
+            gap = combination(groups[2:], [1, -1], generator_for("ledger", *name, "gap"))
+            rest = combination(groups, [1, -1, -0.5, 0.5], generator_for("ledger", *name, "half"))
+            found.append(Statement(robot, side(rest) if gap.low > 0 else "moot", rest))
+        return found
+
+    return find
+
+
+def changes(patterns: Sequence[str], sign: int, endpoint: str = "final") -> Evidence:
+    """Cells of the fourth arm lie above (sign 1) or below (−1) the cell each is compared with."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for cell in select(patterns):
+            gap = _change(outcomes, cell, endpoint)
+            found.append(
+                Statement(_name(cell), side(gap, sign), gap) if gap else Statement(_name(cell), "missing")
+            )
+        return found
+
+    return find
+
+
+def costs(patterns: Sequence[str], *, claimed: bool) -> Evidence:
+    """Cells of the fourth arm lose return, by more than the margin.
+
+    Harmless: the interval lies above −margin. Material: it lies below 0 and is not harmless. `claimed`:
+    the claim is the second.
+    """
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for cell in select(patterns):
+            gap, edge = _change(outcomes, cell, "final"), margin(outcomes, cell.robot)
+            if gap is None or edge is None:
+                found.append(Statement(_name(cell), "missing"))
+                continue
+            harmless, material = bool(gap.low > -edge), bool(gap.high < 0)
+            state: State = "open"
+            if harmless or material:
+                state = "against" if harmless == claimed else "for"
+            found.append(Statement(f"{_name(cell)} (margin {edge:.0f})", state, gap))
+        return found
+
+    return find
+
+
+def _change(outcomes: Outcomes, cell: Cell, endpoint: str) -> Estimate | None:
+    outcome = outcomes.finished.get(cell.id)
+    if outcome is None:
+        return None
+    if endpoint != START:
+        return analysis.change(outcomes, outcome, endpoint)
+    column = Column(cell.arm, cell.algorithm, cell.family, cell.variant)
+    groups = groups_of(outcomes, [(column, cell.robot), (column.baseline, cell.robot)], START)
+    return None if groups is None else combination(groups, [1, -1], generator_for("ledger", cell.id, START))
+
+
+def _name(cell: Cell) -> str:
+    variant = f", {cell.variant}" if cell.variant else ""
+    return f"{cell.robot}, {cell.algorithm.upper()}, {cell.family}{variant}"
+
+
+def gaps(pairs: Sequence[tuple[Column, Column]], robot: str) -> Evidence:
+    """On one robot the first column of each pair ends above the second."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for first, second in pairs:
+            about = f"{first.algorithm.upper()}, {first.family} − {second.family}"
+            groups = groups_of(outcomes, [(first, robot), (second, robot)], "final")
+            if groups is None:
+                found.append(Statement(about, "missing"))
+                continue
+            gap = combination(groups, [1, -1], generator_for("ledger", *first, *second, robot))
+            found.append(Statement(about, side(gap), gap))
+        return found
+
+    return find
+
+
+def learns(column: Column, sign: int = 1) -> Evidence:
+    """A column ends above where it starts, seed by seed; sign −1: the claim is that it does not."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for robot in ROBOTS:
+            outcome = outcomes.find(column, robot)
+            if outcome is None or groups_of(outcomes, [(column, robot)], "final") is None:
+                found.append(Statement(robot, "missing"))
+                continue
+            rise = seeds_of(outcome, "final") - seeds_of(outcome, START)
+            gap = combination([rise], [1], generator_for("ledger", outcome.cell.id, "rise"))
+            found.append(Statement(robot, side(gap) if sign > 0 else _opposite(side(gap)), gap))
+        return found
+
+    return find
+
+
+def _opposite(state: State) -> State:
+    swapped: Mapping[State, State] = {"for": "against", "against": "for"}
+    return swapped.get(state, state)
+
+
+def exceeds(patterns: Sequence[str], measure: Sequence[str], edge: float, digits: int) -> Evidence:
+    """A measured quantity, summed over its columns, ends above an edge: mean of the last five measurements."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for cell in select(patterns):
+            outcome = outcomes.finished.get(cell.id)
+            if outcome is None:
+                found.append(Statement(_name(cell), "missing"))
+                continue
+            last = np.sum([outcome.measured[name] for name in measure], 0)[
+                :, -statistics.settings.LAST_EVALUATIONS :
+            ]
+            if np.isfinite(last.mean(1)).sum() < 2:
+                found.append(Statement(_name(cell), "missing"))
+                continue
+            level = combination([last.mean(1)], [1], generator_for("ledger", cell.id, *measure))
+            found.append(Statement(_name(cell), side(level, 1, edge), level, digits=digits))
+        return found
+
+    return find
+
+
+def improves(contrasts: Sequence[Contrast]) -> Evidence:
+    """A random run of the first family does better than one of the second in more than half of all pairs."""
+
+    def find(outcomes: Outcomes) -> list[Statement]:
+        found = []
+        for contrast in contrasts:
+            chance, about = analysis.improvement(outcomes, contrast, "final"), contrast.algorithm.upper()
+            found.append(
+                Statement(about, side(chance, 1, 0.5), chance, digits=2)
+                if chance
+                else Statement(about, "missing")
+            )
+        return found
+
+    return find
+
+
+def together(*parts: Evidence) -> Evidence:
+    """All statements of several kinds of evidence."""
+    return lambda outcomes: [statement for part in parts for statement in part(outcomes)]

@@ -1,0 +1,164 @@
+"""A claim, its statements, and the rule by which they decide it: counting, without a look at any result.
+
+A **claim** is taken apart into **statements**, numbers with intervals: one per robot, say. Each statement is *for* the
+claim, *against* it, *open* (its interval leaves both possible), *moot* (there is nothing to explain on that robot) or
+*missing* (a cell is not finished). The claim names how many of its statements must hold. Its verdict:
+
+* **supported**: so many hold, whatever the others say;
+* **refuted**: so many are against it that the rest could not make up for them, were they all to hold;
+* **undecided**: otherwise. Open and missing statements decide nothing.
+
+So a cell that arrives later changes no verdict but "undecided". Each kind of evidence says when a statement is for or
+against (`inbounds.study.ledger.evidence`). The protocol of the study fixes endpoints, differences, tests and intervals;
+this rule, the margins and the list of claims were added when three of the 136 cells were known: PPO on HalfCheetah, in
+standard practice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from inbounds.study.grid import select
+from inbounds.study.outcomes import Outcomes
+from inbounds.study.statistics import Estimate
+from inbounds.study.words import p_value, spoken
+
+State: TypeAlias = Literal["for", "against", "open", "moot", "missing"]
+Verdict: TypeAlias = Literal["supported", "refuted", "undecided"]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One of the things that a claim says, as a number."""
+
+    about: str
+    """What of: "Hopper", "Ant, logit-normal − gaussian"."""
+    state: State
+    """What it says to the claim."""
+    estimate: Estimate | None = None
+    """The number with its interval; None where it is missing."""
+    p_adjusted: float = float("nan")
+    """Of the protocol's test after Holm, where it has one."""
+    digits: int | None = None
+    """Decimals to be told; None suits returns."""
+    exact: bool = False
+    """Whether the number is an error of computing, which has no interval."""
+
+    def __str__(self) -> str:
+        if self.estimate is None:
+            return f"{self.about}: missing"
+        if self.exact:
+            return f"{self.about}: {float(self.estimate.value):.0e} ({self.state})"
+        p = p_value(self.p_adjusted)
+        told = f", p {p if p.startswith('<') else f'= {p}'}" if p else ""
+        return f"{self.about}: {spoken(self.estimate, self.digits)}{told} ({self.state})"
+
+
+Evidence: TypeAlias = Callable[[Outcomes], Sequence[Statement]]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim and its test."""
+
+    id: str
+    """Names it on the command line."""
+    subject: str
+    """What it belongs to."""
+    says: str
+    """The claim, in this book's words."""
+    where: str
+    """Where it is made."""
+    test: str
+    """What each statement is, and when it is for the claim."""
+    evidence: Evidence
+    """Finds the statements."""
+    cells: tuple[str, ...] = ()
+    """Patterns of the cells behind it, as `inbounds.study.select` reads them; none: computed on the spot."""
+    needed: int | None = None
+    """How many statements must hold; None is all that are not moot."""
+
+    @property
+    def command(self) -> str:
+        """What prints its statements anew."""
+        return f"inbounds study ledger {self.id}"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What there is to a claim."""
+
+    claim: Claim
+    """Which."""
+    statements: tuple[Statement, ...]
+    """In the claim's order."""
+    finished: int
+    """Cells behind it that are finished."""
+    planned: int
+    """Cells behind it altogether."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """What follows by counting."""
+        return count([statement.state for statement in self.statements], self.claim.needed)
+
+    @property
+    def cells(self) -> str:
+        """How many cells are behind it, in words."""
+        return f"{self.finished} of {self.planned}" if self.planned else "none needed"
+
+    @property
+    def told(self) -> str:
+        """What the statements say, in words; those that are missing by name only."""
+        there = [str(statement) for statement in self.statements if statement.state != "missing"]
+        gone = [statement.about for statement in self.statements if statement.state == "missing"]
+        return "; ".join([*there, *([f"missing: {' · '.join(gone)}"] if gone else [])])
+
+    @property
+    def counted(self) -> str:
+        """How many statements are in which state, in words."""
+        states = Counter(statement.state for statement in self.statements)
+        told = [
+            f"{states[state]} {state}"
+            for state in ("for", "against", "open", "moot", "missing")
+            if states[state]
+        ]
+        needed = len(self.statements) - states["moot"] if self.claim.needed is None else self.claim.needed
+        return f"{', '.join(told)}; needed: {needed}"
+
+
+def count(states: Sequence[State], needed: int | None = None) -> Verdict:
+    """Return the verdict on a claim.
+
+    Args:
+        states: of its statements.
+        needed: how many must hold; None is all that are not moot.
+
+    Returns:
+        "undecided" also where every statement is moot.
+
+    Example:
+        >>> [count(states, 2) for states in (["for"] * 2 + ["open"], ["for", "open"], ["against", "for"])]
+        ['supported', 'undecided', 'refuted']
+    """
+    if needed is None:
+        states = [state for state in states if state != "moot"]
+        needed = max(1, len(states))
+    if states.count("for") >= needed:
+        return "supported"
+    return "refuted" if states.count("against") > len(states) - needed >= 0 else "undecided"
+
+
+def judge(outcomes: Outcomes, claim: Claim) -> Finding:
+    """Find the statements of a claim.
+
+    Args:
+        outcomes: what there is of the study.
+        claim: which.
+    """
+    behind = select(claim.cells) if claim.cells else ()
+    finished = sum(cell.id in outcomes.finished for cell in behind)
+    return Finding(claim, tuple(claim.evidence(outcomes)), finished, len(behind))

@@ -1,0 +1,327 @@
+"""The ledger's verdicts follow from its numbers, its numbers from the files: recomputed here by other code."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from inbounds.cli.studying import study
+from inbounds.study import StudyFolder, select, study_cells
+from inbounds.study import statistics as study_statistics
+from inbounds.study.grid import ROBOTS
+from inbounds.study.ledger import CLAIMS, Claim, Finding, claims_named, count, judge
+from inbounds.study.ledger.evidence import MARGIN, combination, costs, equals, side
+from inbounds.study.ledger.naming import squash
+from inbounds.study.ledger.verdicts import State
+from inbounds.study.outcomes import Outcomes
+from inbounds.study.statistics import Estimate
+from tests.study.small import folder_in
+from tests.study.synthetic import write_cells
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
+STATES: tuple[State, ...] = ("for", "against", "open", "moot", "missing")
+FROM_CELLS = [claim for claim in CLAIMS if claim.cells]
+
+
+@pytest.fixture(scope="module")
+def made_up(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
+    """The whole study, never run."""
+    folder = folder_in(tmp_path_factory.mktemp("whole"))
+    write_cells(folder, study_cells())
+    return Outcomes.read(folder)
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Outcomes:
+    return Outcomes.read(SHIPPED)
+
+
+# ---- the rule
+
+
+@given(st.lists(st.sampled_from(STATES), min_size=1, max_size=8), st.none() | st.integers(1, 8), st.data())
+@settings(deadline=None, max_examples=150)
+def test_what_arrives_later_changes_no_decided_verdict(
+    states: list[State], needed: int | None, data: st.DataObject
+) -> None:
+    if needed is not None:
+        needed = min(needed, len(states))
+    before = count(states, needed)
+    later = [data.draw(st.sampled_from(STATES[:4])) if state == "missing" else state for state in states]
+    if before != "undecided":
+        assert count(later, needed) == before
+
+
+@given(st.lists(st.sampled_from(STATES[:2]), min_size=1, max_size=8), st.integers(1, 8))
+@settings(deadline=None, max_examples=50)
+def test_where_all_is_known_counting_decides(states: list[State], needed: int) -> None:
+    needed = min(needed, len(states))
+    assert count(states, needed) == ("supported" if states.count("for") >= needed else "refuted")
+    assert count(states) == ("refuted" if "against" in states else "supported")
+
+
+def test_where_there_is_nothing_to_explain_nothing_is_decided() -> None:
+    assert count(["moot", "moot"]) == count(["missing"]) == count(["open"]) == "undecided"
+    assert count(["moot", "for"]) == "supported"
+    assert count(["moot", "against", "missing"]) == "refuted"
+
+
+def estimate(low: float, high: float) -> Estimate:
+    return Estimate(*map(np.asarray, ((low + high) / 2, low, high)), 10, 0, 0.95, "mean")
+
+
+@pytest.mark.parametrize(
+    ("ends", "sign", "edge", "said"),
+    [
+        ((1, 2), 1, 0, "for"),
+        ((-2, -1), 1, 0, "against"),
+        ((-1, 1), 1, 0, "open"),
+        ((1, 2), -1, 0, "against"),
+        ((-2, -1), -1, 0, "for"),
+        ((1, 2), 1, 3, "against"),
+        ((0, 1), 1, 0, "open"),
+    ],
+)
+def test_sides(ends: tuple[float, float], sign: int, edge: float, said: str) -> None:
+    assert side(estimate(*ends), sign, edge) == said
+
+
+# ---- the numbers
+
+
+def test_a_combination_of_two_groups_is_their_difference() -> None:
+    rng = np.random.default_rng(1)
+    a, b = rng.normal(3, 1, 10), rng.normal(1, 4, 9)
+    ours = combination([a, b], [1, -1], np.random.default_rng(0))
+    theirs = study_statistics.difference(a, b, np.random.default_rng(0), statistic="mean")
+    assert (ours.value, ours.low, ours.high, ours.n) == (theirs.value, theirs.low, theirs.high, theirs.n)
+
+
+def test_a_combination_covers_what_it_estimates() -> None:
+    """Half of a gap, four groups of ten: the interval is near that of the Normal law, whose width is known."""
+    rng = np.random.default_rng(2)
+    groups = [rng.normal(mean, 2, 10) for mean in (5, 1, 4, 2)]
+    found = combination(groups, [1, -1, -0.5, 0.5], np.random.default_rng(0))
+    exact = groups[0].mean() - groups[1].mean() - (groups[2].mean() - groups[3].mean()) / 2
+    error = np.sqrt(sum(w**2 * g.var(ddof=1) / 10 for w, g in zip((1, 1, 0.5, 0.5), groups, strict=True)))
+    assert found.value == pytest.approx(exact)
+    assert (found.high - found.low) / 2 == pytest.approx(stats.t.ppf(0.975, 30) * error, rel=0.1)
+
+
+def rows(cell_id: str, folder: Path = SHIPPED.results) -> Mapping[str, Any]:
+    """Columns of a cell's file as `[S, E]`, read without the study's code."""
+    table = pq.read_table(folder / "cells" / f"{cell_id}.parquet")
+    seeds = len(set(table["seed"].to_pylist()))
+    return {
+        name: table[name].to_numpy(zero_copy_only=False).reshape(-1, seeds).T for name in table.column_names
+    }
+
+
+def by_hand(cell_id: str, endpoint: str) -> np.ndarray:
+    returns = rows(cell_id)["return_mean"]
+    assert np.isfinite(returns).all(), "no seed of these cells has diverged"
+    return {"start": returns[:, 0], "final": returns[:, -50:].mean(1), "area": returns.mean(1)}[endpoint]
+
+
+def gap(first: str, second: str, endpoint: str) -> tuple[float, float]:
+    """Difference of means, and half the width of Welch's interval."""
+    a, b = by_hand(first, endpoint), by_hand(second, endpoint)
+    interval = stats.ttest_ind(a, b, equal_var=False).confidence_interval()
+    return a.mean() - b.mean(), (interval.high - interval.low) / 2
+
+
+BEATS = re.compile(r"(\w+), (\w+), ([\w-]+) − ([\w-]+)(?: \(margin ±(\d+)\))?$")
+
+
+def test_every_difference_in_the_ledger_is_that_of_the_files(shipped: Outcomes) -> None:
+    """Each statement of two families with a number, against SciPy on the raw rows: value, width, test, state."""
+    seen = 0
+    for claim in FROM_CELLS:
+        arm, endpoint = claim.cells[0].split("-")[0], endpoint_of(claim)
+        for statement in judge(shipped, claim).statements:
+            match = BEATS.match(statement.about)
+            if statement.estimate is None or match is None or np.isnan(statement.p_adjusted):
+                continue
+            robot, algorithm, first, second, _ = match.groups()
+            names = [f"{arm}-{robot.lower()}-{algorithm.lower()}-{family}" for family in (first, second)]
+            value, half = gap(*names, endpoint)
+            assert statement.estimate.value == pytest.approx(value)
+            assert (statement.estimate.high - statement.estimate.low) / 2 == pytest.approx(half, rel=0.2)
+            p = stats.ttest_ind(*(by_hand(name, endpoint) for name in names), equal_var=False).pvalue
+            if statement.state in ("for", "against"):
+                assert p < 0.05
+            assert statement.p_adjusted >= 1e-4
+            seen += 1
+    compared = sum(
+        {f"standard-{robot.lower()}-ppo-{family}" for family in ("gaussian", "logit-normal")}
+        <= shipped.finished.keys()
+        for robot in ROBOTS
+    )
+    assert seen >= 2 * compared > 0  # the start and the end, at least
+
+
+def endpoint_of(claim: Claim) -> str:
+    if claim.id.startswith("start"):
+        return "start"
+    return "area" if claim.id == "faster" else "final"
+
+
+def test_the_other_numbers_are_those_of_the_files(shipped: Outcomes) -> None:
+    """Changes of the fourth arm, rises and levels, where there are any; every number without a test is looked at."""
+    for claim in FROM_CELLS:
+        for statement in judge(shipped, claim).statements:
+            if statement.estimate is None or not np.isnan(statement.p_adjusted):
+                continue
+            value = float(statement.estimate.value)
+            parts = statement.about.partition(" (")[0].split(", ")
+            if claim.id in ("start-raw", "beta-entropy", "clip", "swimmer-gamma"):
+                robot, algorithm, family, variant = (part.lower() for part in parts)
+                changed = f"mechanisms-{robot}-{algorithm}-{family}-{variant}"
+                arm = "beyond" if (algorithm, family) == ("trpo", "beta") else "standard"
+                plain = f"{arm}-{robot}-{algorithm}-{family}"
+                assert value == pytest.approx(gap(changed, plain, endpoint_of(claim))[0])
+            elif claim.id == "beta-trpo":
+                cell = f"beyond-{parts[0].lower()}-trpo-beta"
+                assert value == pytest.approx(np.mean(by_hand(cell, "final") - by_hand(cell, "start")))
+            elif claim.id.startswith("large"):
+                robot, algorithm, family = (part.lower() for part in parts)
+                found = rows(f"printed-{robot}-{algorithm}-{family}")
+                names = ["abs_loc_q99"] if family == "logit-normal" else ["at_alpha_max", "at_beta_max"]
+                last = sum(found[name][:, [459, 469, 479, 489, 499]].mean() for name in names)
+                assert value == pytest.approx(last, rel=1e-5)
+            elif claim.id in ("start-cause", "cause-noise", "cause-capg"):
+                robot = statement.about.lower()
+                arm, ending = ("beyond", "") if claim.id == "cause-capg" else ("mechanisms", "-matched-noise")
+                now = f"{arm}-{robot}-ppo-" + ("clipped-gaussian" if not ending else f"logit-normal{ending}")
+                than = (
+                    f"standard-{robot}-ppo-gaussian" if not ending else f"{arm}-{robot}-ppo-gaussian{ending}"
+                )
+                before = gap(
+                    f"standard-{robot}-ppo-logit-normal", f"standard-{robot}-ppo-gaussian", endpoint_of(claim)
+                )[0]
+                assert value == pytest.approx(gap(now, than, endpoint_of(claim))[0] - before / 2)
+            elif claim.id == "swimmer-order":
+                algorithm, pair = parts[0].lower(), parts[1].split(" − ")
+                names = [f"mechanisms-swimmer-{algorithm}-{family}-gamma-0.9999" for family in pair]
+                assert value == pytest.approx(gap(names[0], names[1], "final")[0])
+            elif claim.id.startswith("overall"):
+                arm, algorithm = claim.id.partition("-")[2], parts[0].lower()
+                wins = []
+                for robot in ROBOTS:
+                    a, b = (
+                        by_hand(f"{arm}-{robot.lower()}-{algorithm}-{f}", "final")
+                        for f in ("logit-normal", "gaussian")
+                    )
+                    wins.append(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
+                assert value == pytest.approx(np.mean(wins))
+            else:
+                assert claim.id == "ties", f"{claim.id}: say here how its number follows from the files"
+
+
+def test_numbers_do_not_depend_on_the_order_in_which_they_are_asked_for(shipped: Outcomes) -> None:
+    claim = claims_named(["wins-ppo-standard"])[0]
+    first = judge(shipped, claim)
+    for other in FROM_CELLS[::-1]:
+        judge(shipped, other)
+    assert judge(shipped, claim).told == first.told
+
+
+# ---- the whole study
+
+
+def test_a_whole_study_leaves_nothing_missing(made_up: Outcomes) -> None:
+    verdicts = {}
+    for claim in FROM_CELLS:
+        found = judge(made_up, claim)
+        assert found.finished == found.planned > 0, claim.id
+        assert all(statement.state != "missing" for statement in found.statements), claim.id
+        assert all(statement.estimate is not None for statement in found.statements)
+        verdicts[claim.id] = found.verdict
+    # What the made-up levels say: Beta above Gaussian by 250, logit-normal above Beta by 250, everywhere.
+    assert (
+        verdicts["wins-ppo-printed"]
+        == verdicts["wins-beta-standard"]
+        == verdicts["overall-printed"]
+        == "supported"
+    )
+    assert verdicts["trpo-named"] == verdicts["swimmer-standard"] == verdicts["beta-trpo"] == "refuted"
+    assert verdicts["ties"] == "refuted"
+    assert verdicts["start-printed"] == "undecided"  # nothing differs there
+    assert (
+        verdicts["clip"] == verdicts["swimmer-gamma"] == "refuted"
+    )  # a variant costs 20 for each letter of its name
+
+
+def test_a_statement_names_the_cells_it_needs(made_up: Outcomes) -> None:
+    """Without the first or the last of its cells a claim has something missing."""
+    for claim in FROM_CELLS:
+        chosen = select(claim.cells)
+        for cell in {chosen[0], chosen[-1]}:
+            less = Outcomes(
+                {k: v for k, v in made_up.finished.items() if k != cell.id}, made_up.states, made_up.folder
+            )
+            missing = [s for s in judge(less, claim).statements if s.state == "missing"]
+            assert missing, f"{claim.id} does without {cell.id}"
+
+
+# ---- margins
+
+
+def test_equality_needs_the_whole_interval_within_the_margin(made_up: Outcomes) -> None:
+    claim = equals(squash("ppo", "standard"), ["Hopper"])
+    (far,) = claim(made_up)
+    edge = int(re.search(r"±(\d+)", far.about)[1])  # type: ignore[index]
+    start, end = (rows_of(made_up, "standard-hopper-ppo-gaussian", k) for k in ("start", "final"))
+    assert edge == pytest.approx(MARGIN * (end - start), abs=1)
+    assert far.state == "against"  # 500 apart, the margin is about 140
+
+
+def rows_of(outcomes: Outcomes, cell: str, endpoint: str) -> float:
+    returns = outcomes.finished[cell].returns
+    return float((returns[:, 0] if endpoint == "start" else returns[:, -50:].mean(1)).mean())
+
+
+def test_a_loss_below_the_margin_is_harmless(made_up: Outcomes) -> None:
+    (needs,) = costs(["mechanisms-hopper-ppo-beta-entropy-0"], claimed=True)(made_up)
+    (serves,) = costs(["mechanisms-hopper-ppo-beta-entropy-0"], claimed=False)(made_up)
+    assert {needs.state, serves.state} in ({"for", "against"}, {"open"})
+
+
+# ---- how it is told
+
+
+def test_the_command_prints_the_statements(capsys: pytest.CaptureFixture[str]) -> None:
+    where = ["--results", str(ROOT / "results")]
+    for claim in claims_named(["wins-ppo-standard", "kl"]):
+        assert study([*claim.command.split()[2:], *where]) == 0
+        told = capsys.readouterr().out
+        found = judge(Outcomes.read(SHIPPED), claim)
+        assert f"{claim.id}: {found.verdict}" in told
+        assert all(str(statement) in told for statement in found.statements)
+
+
+def test_an_unknown_claim_is_a_clear_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert study(["ledger", "nonsense", "--results", "no/results"]) == 2
+    assert "there are start-printed" in capsys.readouterr().err
+
+
+def test_claims_have_names_of_their_own_and_cells_of_the_study() -> None:
+    assert len({claim.id for claim in CLAIMS}) == len(CLAIMS)
+    for claim in FROM_CELLS:
+        assert select(claim.cells)
+        assert all(select([pattern]) for pattern in claim.cells)
+
+
+def test_words() -> None:
+    found = Finding(CLAIMS[0], (), 2, 12)
+    assert found.cells == "2 of 12"
+    assert found.counted == "; needed: 0"
+    assert found.verdict == "undecided"
