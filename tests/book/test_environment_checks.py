@@ -1,0 +1,193 @@
+"""The checks of environments let right ones pass, each stops what it is there for, and the graders name mistakes."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inbounds import robots
+from inbounds.book import graders_own_environment
+from inbounds.book.environment_checks import CHECKS, complaints
+from tests.learning.point import PointEnv
+
+
+class Amnesic(PointEnv):
+    def reset(self, *, seed=None, options=None):
+        self.draws = getattr(self, "draws", 0) + 1
+        return super().reset(seed=None if seed is None else [self.draws + s for s in seed])
+
+
+class Chatty(PointEnv):
+    """Its points pull each other."""
+
+    def step(self, actions):
+        return super().step(actions + 0.01 * self.x.mean(0))
+
+
+class Crowd(PointEnv):
+    """Its points draw their starts from one generator."""
+
+    def reset(self, *, seed=None, options=None):
+        return super().reset(seed=None if seed is None else [sum(seed) + i for i in range(len(seed))])
+
+
+class Recycled(PointEnv):
+    def step(self, actions):
+        obs, *rest = super().step(actions)
+        self.seen = getattr(self, "seen", obs)
+        self.seen[:] = obs
+        return self.seen, *rest
+
+
+class HalfBlind(PointEnv):
+    def step(self, actions):
+        return super().step(np.maximum(actions, 0))
+
+
+class Forgetful(PointEnv):
+    def step(self, actions):
+        obs, *rest, info = super().step(actions)
+        return obs, *rest, {"final_obs": obs} if info else info
+
+
+class Silent(PointEnv):
+    def step(self, actions):
+        return *super().step(actions)[:-1], {}
+
+
+class Clockless(PointEnv):
+    def step(self, actions):
+        obs, reward, terminated, truncated, info = super().step(actions)
+        return obs, reward, terminated | truncated, np.zeros_like(truncated), info
+
+
+class Summed(PointEnv):
+    def step(self, actions):
+        obs, reward, *rest = super().step(actions)
+        return obs, reward.sum(), *rest
+
+
+class Elsewhere(PointEnv):
+    def step(self, actions):
+        obs, *rest = super().step(actions)
+        return obs[:, :2], *rest
+
+
+BROKEN = {
+    Summed: "spaces",
+    Elsewhere: "spaces",
+    Amnesic: "seeds",
+    Chatty: "neighbours",
+    Crowd: "neighbours",
+    Recycled: "own copies",
+    HalfBlind: "bounds",
+    Forgetful: "final observation",
+    Silent: "final observation",
+    Clockless: "time limit",
+}
+
+
+@pytest.mark.parametrize("make", [PointEnv, lambda n: PointEnv(n, low=(-1, -0.5), high=(1, 2))])
+def test_a_sound_environment_passes(make: Callable) -> None:
+    assert complaints(make) == {}
+    assert graders_own_environment.own_environment(make).passed is True
+
+
+@pytest.mark.slow
+def test_the_robots_pass() -> None:
+    assert complaints(lambda n: robots.make("Hopper-v5", n)) == {}
+
+
+@pytest.mark.parametrize(("broken", "check"), BROKEN.items(), ids=lambda x: getattr(x, "__name__", x))
+def test_each_fault_is_stopped_by_its_check_first(broken: Callable, check: str) -> None:
+    assert next(iter(complaints(broken))) == check
+    verdict = graders_own_environment.own_environment(broken)
+    assert verdict.passed is False
+    assert f'"{check}"' in verdict.message
+
+
+def test_the_reason_is_said() -> None:
+    said = {kind.__name__: complaints(kind)[check] for kind, check in BROKEN.items()}
+    assert "lower half of its interval [-1, 1]" in said["HalfBlind"]
+    assert "longer than 20 steps" in said["Clockless"]
+    assert "first observation of the next" in said["Forgetful"]
+    assert "without info['final_obs']" in said["Silent"]
+    assert "neighbours have other seeds" in said["Crowd"]
+    assert "neighbours act otherwise" in said["Chatty"]
+    assert "array of shape [N]" in said["Summed"]
+    assert "not one of Box" in said["Elsewhere"]
+
+
+def test_a_reset_in_another_step_is_refused_with_the_fix() -> None:
+    class NextStep(PointEnv):
+        def __init__(self, num_envs: int) -> None:
+            super().__init__(num_envs)
+            self.metadata = {"autoreset_mode": "NextStep"}
+
+    assert "SAME_STEP" in complaints(NextStep)["spaces"]
+
+
+def test_the_diagnosis() -> None:
+    answers: dict[Any, Any] = dict(BROKEN)
+    broken = {kind: kind for kind in BROKEN}
+    assert graders_own_environment.diagnosis(answers, broken).passed is True
+    verdict = graders_own_environment.diagnosis(answers | {Clockless: "seeds"}, broken)
+    assert verdict.passed is False
+    assert "gets past that one" in verdict.message
+    verdict = graders_own_environment.diagnosis(answers | {Amnesic: "time limit"}, broken)
+    assert "an earlier check" in verdict.message
+    verdict = graders_own_environment.diagnosis(answers | {Amnesic: "amnesia"}, broken)
+    assert all(name in verdict.message for name in CHECKS)
+
+
+def shares(action: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    unit = 2 * (action - low) / (high - low) - 1
+    return np.array([(unit <= -0.999).mean(0), (unit >= 0.999).mean(0)])
+
+
+def value(gamma: float, steps: int) -> float:
+    return (1 - gamma * (1 - gamma**steps) / (steps * (1 - gamma))) / (1 - gamma)
+
+
+@pytest.mark.parametrize(("name", "right"), [("at_bounds", shares), ("value_under_a_clock", value)])
+def test_right_answers_pass_and_none_is_no_failure(name: str, right: Callable) -> None:
+    grader = getattr(graders_own_environment, name)
+    assert grader(right).passed is True
+    assert grader(lambda *_: ...).passed is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda a, lo, hi: np.stack([(a <= lo).mean(0), (a >= hi).mean(0)]), "only exact hits"),
+        (lambda a, lo, hi: np.stack([(a <= lo + 1e-3).mean(0), (a >= hi - 1e-3).mean(0)]), "no units"),
+        (lambda a, lo, hi: shares(a, lo - 1e-3 * (hi - lo) / 2, hi + 1e-3 * (hi - lo) / 2), "only exact"),
+        (lambda a, lo, hi: shares(a, lo, hi).sum(0), "both bounds"),
+        (lambda a, lo, hi: shares(a, lo, hi)[::-1], "changed places"),
+        (lambda a, lo, hi: shares(a, lo, hi).mean(1), "pooled"),
+        (lambda a, lo, hi: shares(a, -np.ones(1), np.ones(1)), "a box of [−1, 1]"),
+        (lambda a, lo, hi: shares(a, lo, hi).T, "some share"),
+    ],
+)
+def test_mistakes_in_saturation_are_named(wrong: Callable, words: str) -> None:
+    verdict = graders_own_environment.at_bounds(wrong)
+    assert verdict.passed is False
+    assert words in verdict.message
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda g, n: 1 / (1 - g), "without a clock"),
+        (lambda g, n: (1 - g**n) / (1 - g), "first step"),
+        (lambda g, n: (value(g, n) - 1) / g, "one step is missing"),
+        (lambda g, n: 1 + g * value(g, n), "too many"),
+        (lambda g, n: n * value(g, n), "divide by N"),
+        (lambda g, n: 1 - (1 - g) * value(g, n), "shortfall"),
+    ],
+)
+def test_mistakes_about_the_clock_are_named(wrong: Callable, words: str) -> None:
+    verdict = graders_own_environment.value_under_a_clock(wrong)
+    assert verdict.passed is False
+    assert words in verdict.message
