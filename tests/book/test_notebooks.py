@@ -19,6 +19,9 @@ REFERENCE_PAGES = {
     # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
     # here the page must show every claim (`test_the_ledger_is_generated`).
     "17_claims_ledger",
+    # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in a cell
+    # and end in a project (`test_every_road_is_tried`).
+    "19_what_next",
 }
 CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
 
@@ -111,6 +114,22 @@ def test_the_ledger_is_generated() -> None:
     assert any("study_pages.findings(outcomes)" in source for source in code)
     assert any(source.strip() == "study_pages.ledger(found)" for source in code)
     assert all(word in prose for word in ("**Supported**", "**Refuted**", "**Undecided**", "**missing**"))
+
+
+def test_every_road_is_tried() -> None:
+    """Each road stands in the table, states something proved, cites, is tried by a cell that asserts, and ends in a project."""
+    cells = nbformat.read(ROOT / "notebooks" / "19_what_next.ipynb", as_version=4).cells
+    page = "\n".join(f"<code>{c.source}</code>" if c.cell_type == "code" else c.source for c in cells)
+    front, *roads = re.split(r"^\((next-[a-z]+)\)=\n(?=#)", page, flags=re.MULTILINE)
+    labels, texts = roads[::2], roads[1::2]
+    assert re.findall(r"^\* - \{ref\}`.*<(next-.*)>`$", front, flags=re.MULTILINE) == labels
+    for label, text in zip(labels, texts, strict=True):
+        code = re.findall(r"<code>(.*?)</code>", text, flags=re.DOTALL)
+        assert any(re.search(r"\bassert", cell) for cell in code), label
+        assert "{prf:" in text, label
+        assert "**Project.**" in text, label
+        assert "{cite" in text or "{prf:ref}`thm-invariance`" in text, label
+    assert "None of this was part of the study" in front
 
 
 def small_notebook(folder: Path) -> nbformat.NotebookNode:
