@@ -19,8 +19,8 @@ REFERENCE_PAGES = {
     # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
     # here the page must show every claim (`test_the_ledger_is_generated`).
     "17_claims_ledger",
-    # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in a cell
-    # and end in a project (`test_every_road_is_tried`).
+    # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in
+    # a cell and end in a project (`test_every_road_is_tried`).
     "19_what_next",
 }
 CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
@@ -117,7 +117,7 @@ def test_the_ledger_is_generated() -> None:
 
 
 def test_every_road_is_tried() -> None:
-    """Each road stands in the table, states something proved, cites, is tried by a cell that asserts, and ends in a project."""
+    """Each road stands in the table, is tried by a cell that asserts, and ends in a project."""
     cells = nbformat.read(ROOT / "notebooks" / "19_what_next.ipynb", as_version=4).cells
     page = "\n".join(f"<code>{c.source}</code>" if c.cell_type == "code" else c.source for c in cells)
     front, *roads = re.split(r"^\((next-[a-z]+)\)=\n(?=#)", page, flags=re.MULTILINE)
