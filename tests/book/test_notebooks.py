@@ -25,6 +25,12 @@ REFERENCE_PAGES = {
 }
 CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
 
+STUDY_CHAPTERS = {
+    # They read what was measured and state no theorem of their own; all else a chapter owes its reader they owe too.
+    "15_figures_reproduced",
+    "16_mechanisms",
+}
+
 
 ANATOMY = (
     "## Objectives",
@@ -81,6 +87,8 @@ def test_anatomy(path: Path) -> None:
         cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown"
     )
     for part in ANATOMY:
+        if part == "{prf:" and path.stem in STUDY_CHAPTERS:
+            continue
         assert part in prose, part
 
 

@@ -9,15 +9,23 @@ The text form of what is shown holds no number: a stored notebook stays the same
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
-from inbounds.book import report_arms, report_ledger, study_report
+import gymnasium
+import numpy as np
+
+from inbounds.book import report_arms, report_ledger, report_results, study_report
 from inbounds.book import report_page as html
-from inbounds.book.report_aggregates import aggregates
+from inbounds.book.figures import FAMILIES
+from inbounds.book.report_aggregates import aggregates, columns_of
 from inbounds.book.report_arms import Cells
 from inbounds.book.shown import Shown
+from inbounds.book.videos import show_films
+from inbounds.learning import load_policy
+from inbounds.robots import Film, record
 from inbounds.study.ledger import CLAIMS, Finding, judge
-from inbounds.study.outcomes import Outcomes
+from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.store import StudyFolder
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/study_pages.py
@@ -91,6 +99,54 @@ def changes(outcomes: Outcomes, word: str) -> Shown:
     return _shown(
         f"study: what changes, {study_report.GROUPS[word].lower()}", study_report.changes(outcomes, word)
     )
+
+
+def score_sheet(outcomes: Outcomes) -> Shown:
+    """Return wins and losses after Holm, beside what the source thesis says."""
+    return _shown("study: wins and losses", report_results.score_sheet(outcomes))
+
+
+def published(outcomes: Outcomes) -> Shown:
+    """Return published scores beside the study's."""
+    return _shown("study: beside published scores", report_results.published(outcomes))
+
+
+def films(outcomes: Outcomes, robot: str, algorithm: str = "ppo", seconds: float = 4.0) -> Shown:
+    """Return films of the final policies of arm 1 on a robot, acting by the median, one family beside the other.
+
+    Each family shows the seed whose policy has the middle return (of ten, the lower of the two in the middle).
+
+    Args:
+        outcomes: what there is of the study.
+        robot: its name, as in `inbounds.study.grid.ROBOTS`.
+        algorithm: ppo or trpo.
+        seconds: of each film.
+    """
+    columns = columns_of("standard", algorithm)
+    found = {f: outcome for f, c in columns.items() if (outcome := outcomes.find(c, robot)) is not None}
+    shown = {_caption(o): _film(outcomes, o, seconds) for o in found.values()}
+    parts = [show_films(shown)._repr_html_()] if shown else []
+    lacking = [FAMILIES[family].label for family in columns if family not in found]
+    if lacking:
+        parts.append(html.paragraph(f"missing, not finished: {', '.join(lacking)}.", "missing"))
+    return _shown(f"films: {robot}, {algorithm.upper()}, one per family", parts)
+
+
+def middle_seed(outcome: Outcome) -> int:
+    """Return the place of the seed whose final policy, acting by the median, has the middle return."""
+    returns = outcome.ways["median"]
+    return int(np.argsort(returns, kind="stable")[(np.isfinite(returns).sum() - 1) // 2])
+
+
+def _caption(outcome: Outcome) -> str:
+    seed = middle_seed(outcome)
+    return f"{FAMILIES[outcome.cell.family].label}, seed {outcome.cell.seeds[seed]}: {outcome.ways['median'][seed]:.0f}"
+
+
+def _film(outcomes: Outcomes, outcome: Outcome, seconds: float) -> Film:
+    policy = load_policy(outcomes.folder.policy_files(outcome.cell)[0], middle_seed(outcome))
+    with closing(gymnasium.make(policy.config.env)) as env:
+        return record(env, lambda obs: policy.act(obs, greedy="median"), seconds=seconds, seed=0)
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:

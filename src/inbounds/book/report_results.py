@@ -1,0 +1,94 @@
+"""Two tables on the thesis's results: wins and losses by the protocol, and scores that others have published."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from inbounds.book import report_page as html
+from inbounds.book.report_arms import title_of
+from inbounds.book.report_words import pair_name, spoken, verdict
+from inbounds.study import analysis
+from inbounds.study.analysis import CONTRASTS
+from inbounds.study.grid import ROBOTS
+from inbounds.study.outcomes import Column, Outcomes
+
+THESIS: Mapping[tuple[str, str, str], str] = {
+    ("ppo", "logit-normal", "gaussian"): "ahead on 2, little difference on 3, behind on 1",
+    ("ppo", "beta", "gaussian"): "ahead on most",
+    ("ppo", "logit-normal", "beta"): "little difference; faster on 2",
+    ("trpo", "logit-normal", "gaussian"): "ahead on 4, behind on 2",
+}
+"""Algorithm, first and second family → what chapter 5 of the source thesis says, in this book's words."""
+
+_WORDS = ("higher", "lower", "not after Holm", "unresolved", "missing")
+
+
+def score_sheet(outcomes: Outcomes) -> list[str]:
+    """Return on how many robots each difference of mean final returns goes which way, beside what the thesis says."""
+    rows = []
+    for contrast in CONTRASTS:
+        found = Counter(
+            verdict(row) or "missing" for row in analysis.differences(outcomes, contrast, "final").values()
+        )
+        said = "" if contrast.arm == "beyond" else THESIS[contrast.algorithm, contrast.first, contrast.second]
+        rows.append(
+            [
+                title_of(contrast.arm, contrast.algorithm),
+                pair_name(contrast),
+                *(str(found[w]) for w in _WORDS),
+                said,
+            ]
+        )
+    caption = (
+        f"On how many of {len(ROBOTS)} robots the first family's mean final return is higher or lower "
+        f"than the second's after "
+        "Holm's correction; not after Holm: the interval leaves out 0, the corrected test does not; "
+        "unresolved: the interval contains 0."
+    )
+    return [html.table(caption, ["columns", "difference", *_WORDS, "the source thesis"], rows, (0, 1, 7))]
+
+
+PUBLISHED: Mapping[str, Mapping[str, tuple[str, str]]] = {
+    "ppo": {
+        "HalfCheetah": ("5783.9 ± 1244.0", "≈ 1700"),
+        "Hopper": ("2609.3 ± 700.8", "≈ 2400"),
+        "Swimmer": ("66.7 ± 99.1", "≈ 111"),
+        "Walker2d": ("3588.5 ± 756.6", "≈ 3510"),
+        "Ant": ("3258.4 ± 1079.3", "–"),
+        "Humanoid": ("787.1 ± 193.5", "–"),
+    },
+    "trpo": {
+        "HalfCheetah": ("4471.2 ± 804.9", "≈ 1350"),
+        "Hopper": ("2046.0 ± 1037.9", "≈ 2200"),
+        "Swimmer": ("40.9 ± 19.6", "≈ 95"),
+        "Walker2d": ("3826.7 ± 782.7", "≈ 2350"),
+        "Ant": ("2866.7 ± 707.9", "–"),
+        "Humanoid": ("810.1 ± 126.1", "–"),
+    },
+}
+"""Algorithm → robot → scores after one million steps as the README of Tianshou's MuJoCo benchmark prints
+them (`examples/mujoco`): its own,
+robots of version 3, and those of OpenAI Baselines, which it has read off plots. Both use Gaussian
+policies."""
+
+
+def published(outcomes: Outcomes) -> list[str]:
+    """Return published scores of Gaussian policies beside the study's, with the metric of each."""
+    rows = []
+    for algorithm, scores in PUBLISHED.items():
+        for robot in ROBOTS:
+            outcome = outcomes.find(Column("standard", algorithm, "gaussian"), robot)
+            ours = [spoken(analysis.estimate(outcome, e) if outcome else None) for e in ("final", "greedy")]
+            rows.append([robot, algorithm.upper(), *scores[robot], *ours])
+    caption = (
+        "Gaussian policies after about a million steps. Tianshou: largest mean of ten test episodes that "
+        "any evaluation reached, mean "
+        "± standard deviation over ten runs, robots v3. Baselines: read off plots by Tianshou's authors. "
+        "This study: standard practice, "
+        "robots v5, means over ten seeds with 95 % intervals; final: training episodes of the last tenth; "
+        "greedy: median action, last five "
+        "evaluations."
+    )
+    head = ["robot", "algorithm", "Tianshou, best", "Baselines", "this study, final", "this study, greedy"]
+    return [html.table(caption, head, rows, (0, 1))]
