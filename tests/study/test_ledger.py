@@ -17,7 +17,7 @@ from inbounds.study import StudyFolder, select, study_cells
 from inbounds.study import statistics as study_statistics
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import CLAIMS, Claim, Finding, claims_named, count, judge
-from inbounds.study.ledger.evidence import MARGIN, combination, costs, equals, side
+from inbounds.study.ledger.evidence import MARGIN, combination, costs, equals, half_left, side
 from inbounds.study.ledger.naming import squash
 from inbounds.study.ledger.verdicts import State
 from inbounds.study.outcomes import Outcomes
@@ -197,7 +197,7 @@ def test_the_other_numbers_are_those_of_the_files(shipped: Outcomes) -> None:
                 names = ["abs_loc_q99"] if family == "logit-normal" else ["at_alpha_max", "at_beta_max"]
                 last = sum(found[name][:, [459, 469, 479, 489, 499]].mean() for name in names)
                 assert value == pytest.approx(last, rel=1e-5)
-            elif claim.id in ("start-cause", "cause-noise", "cause-capg"):
+            elif claim.id in ("start-noise", "cause-noise", "cause-capg"):
                 robot = statement.about.lower()
                 arm, ending = ("beyond", "") if claim.id == "cause-capg" else ("mechanisms", "-matched-noise")
                 now = f"{arm}-{robot}-ppo-" + ("clipped-gaussian" if not ending else f"logit-normal{ending}")
@@ -270,6 +270,34 @@ def test_a_statement_names_the_cells_it_needs(made_up: Outcomes) -> None:
             )
             missing = [s for s in judge(less, claim).statements if s.state == "missing"]
             assert missing, f"{claim.id} does without {cell.id}"
+
+
+# ---- what needs no cell
+
+
+def test_what_is_computed_on_the_spot_is_decided(shipped: Outcomes) -> None:
+    """Mathematics and untrained policies: of cost alone the machine may have a say."""
+    verdicts = {claim.id: judge(shipped, claim).verdict for claim in CLAIMS if not claim.cells}
+    del verdicts["fisher-time"]
+    assert verdicts == {
+        "start-cause": "refuted",
+        "kl": "supported",
+        "fisher-error": "supported",
+        "beta-hessian": "refuted",
+        "centres": "refuted",
+    }
+
+
+def test_half_of_a_gap() -> None:
+    rng = np.random.default_rng(0)
+    low, middle, high = (rng.normal(mean, 1, 10) for mean in (0.0, 5.0, 10.0))
+    kept = half_left("x", [high, low, high, low], ["kept"], claimed=True)
+    closed = half_left("x", [middle, middle, high, low], ["closed"], claimed=True)
+    assert (kept.state, closed.state) == ("for", "against")
+    assert half_left("x", [middle, middle, high, low], ["closed"], claimed=False).state == "for"
+    assert half_left("x", [high, low, middle, middle], ["none"], claimed=True).state == "moot"
+    assert closed.estimate is not None
+    assert closed.estimate.value == pytest.approx(-(high.mean() - low.mean()) / 2)
 
 
 # ---- margins

@@ -78,8 +78,9 @@ def differences(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
 
 def inside(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     """Return the table of what happened inside: noise, saturation, clamps, KL, entropy."""
-    title, cells = report_arms.title_of(arm, algorithm), report_arms.cells_of(outcomes, arm, algorithm)
-    return _shown(f"study: inside, {title}", [report_arms.diagnostics(title, cells)])
+    return _of_arm(
+        "inside", outcomes, arm, algorithm, lambda title, cells: [report_arms.diagnostics(title, cells)]
+    )
 
 
 def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:

@@ -5,9 +5,11 @@ Exact numbers are errors of computing; those that depend on drawn seeds come wit
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Literal
 
 import numpy as np
 import torch
@@ -18,7 +20,7 @@ from inbounds.distributions import LogitNormal
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, Trainer, preset, trpo
 from inbounds.learning.training import one_thread
 from inbounds.study.analysis import generator_for
-from inbounds.study.ledger.evidence import combination, side
+from inbounds.study.ledger.evidence import combination, half_left, side
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Floats, Outcomes
 from inbounds.study.statistics import Estimate
@@ -107,6 +109,49 @@ def _law(loc: float, scale: float) -> LogitNormal:
     return LogitNormal(
         torch.tensor(loc, dtype=torch.float64), torch.tensor(scale, dtype=torch.float64), 0.0, 1.0
     )
+
+
+LOUD = 0.7
+"""Executed standard deviation, in half ranges: near a Gaussian's default, and near the most a logit-normal can have."""
+
+
+@functools.cache
+def untrained(
+    family: str, robot: str, std: float | None = None, mode: Literal["clip", "raw"] = "clip"
+) -> Floats:
+    """Return the mean return of each of ten untrained policies in a thousand steps, preset `common`, `[S]`.
+
+    Args:
+        family: of the policies.
+        robot: its name, as in `inbounds.study.grid.ROBOTS`.
+        std: executed noise, in half ranges; None is the family's default.
+        mode: whether the action is clipped before the robot and its reward see it.
+
+    Example:
+        >>> untrained("beta", "Swimmer").shape
+        (10,)
+    """
+    config = preset("common", f"{robot}-v5", policy=family, epochs=1)
+    policy = dataclasses.replace(config.policy, initial_std=std)
+    config = dataclasses.replace(config, policy=policy, action_mode=mode)
+    with one_thread():
+        return np.array([np.mean(ended) for ended in Trainer(config).collector.collect(1000).episode_returns])
+
+
+def loud_starts(robots: Sequence[str]) -> Evidence:
+    """Of the gap between untrained logit-normals and Gaussians at least half is left where both are `LOUD`.
+
+    The loud logit-normal never leaves the box, the loud Gaussian does.
+    """
+
+    def find(_: Outcomes) -> list[Statement]:
+        found = []
+        for robot in robots:
+            groups = [untrained(f, robot, std) for std in (LOUD, None) for f in ("logit-normal", "gaussian")]
+            found.append(half_left(robot, groups, ("loud", robot), claimed=True))
+        return found
+
+    return find
 
 
 def sampled_error(_: Outcomes) -> list[Statement]:

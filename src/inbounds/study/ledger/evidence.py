@@ -155,12 +155,16 @@ def equals(contrast: Contrast, robots: Sequence[str], endpoint: str = "final") -
 
 
 def half_remains(
-    now: tuple[Column, Column], before: tuple[Column, Column], robots: Sequence[str], endpoint: str
+    now: tuple[Column, Column],
+    before: tuple[Column, Column],
+    robots: Sequence[str],
+    endpoint: str,
+    *,
+    claimed: bool = True,
 ) -> Evidence:
-    """Of a gap between two columns, at least half is left where something else has been changed.
+    """Of a gap between two columns, at least half is left where something else has been changed; see `half_left`.
 
-    The number is (gap now) − ½ (gap before). For: above 0; against: below; moot: the gap before is not
-    clearly above 0.
+    `claimed`: the claim is that so much is left, else that less is.
     """
 
     def find(outcomes: Outcomes) -> list[Statement]:
@@ -169,14 +173,22 @@ def half_remains(
             groups = groups_of(outcomes, [(column, robot) for column in (*now, *before)], endpoint)
             if groups is None:
                 found.append(Statement(robot, "missing"))
-                continue
-            name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
-            gap = combination(groups[2:], [1, -1], generator_for("ledger", *name, "gap"))
-            rest = combination(groups, [1, -1, -0.5, 0.5], generator_for("ledger", *name, "half"))
-            found.append(Statement(robot, side(rest) if gap.low > 0 else "moot", rest))
+            else:
+                name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
+                found.append(half_left(robot, groups, name, claimed=claimed))
         return found
 
     return find
+
+
+def half_left(about: str, groups: Sequence[Floats], name: Sequence[str], *, claimed: bool) -> Statement:
+    """Say whether half of a gap is left: (a − b) − ½ (c − d) for the means of four groups.
+
+    For: above 0, or below where that is claimed. Moot: the gap c − d is not clearly above 0.
+    """
+    gap = combination(groups[2:], [1, -1], generator_for("ledger", *name, "gap"))
+    rest = combination(groups, [1, -1, -0.5, 0.5], generator_for("ledger", *name, "half"))
+    return Statement(about, side(rest, 1 if claimed else -1) if gap.low > 0 else "moot", rest)
 
 
 def changes(patterns: Sequence[str], sign: int, endpoint: str = "final") -> Evidence:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from inbounds.study.analysis import Contrast
 from inbounds.study.grid import LONG_GAMMA
+from inbounds.study.ledger import computed
 from inbounds.study.ledger.evidence import (
     START,
     beats,
@@ -43,8 +44,17 @@ STARTS = [
         _START,
         "It starts low because its samples leave the box.",
         "ch. 6, 2nd paragraph",
-        "With equal executed noise at least half of the first epoch's gap (logit-normal − Gaussian) is "
-        "left on every robot that has one.",
+        f"Untrained policies: where both families execute noise of {computed.LOUD}, and only the Gaussian leaves "
+        "the box, at least half of the gap (logit-normal − Gaussian) is left on every robot that has one.",
+        computed.loud_starts(("HalfCheetah", "Hopper", "Walker2d")),
+    ),
+    Claim(
+        "start-noise",
+        _START,
+        "It starts low because it starts loud: with equal noise the gap closes.",
+        "this book, Part IV",
+        "First epoch: with equal executed noise (0.4) less than half of the gap (logit-normal − Gaussian) is left on "
+        "every robot that has one.",
         half_remains(
             (
                 Column("mechanisms", "ppo", "logit-normal", "matched-noise"),
@@ -53,6 +63,7 @@ STARTS = [
             (Column("standard", "ppo", "logit-normal"), Column("standard", "ppo", "gaussian")),
             NOISY,
             START,
+            claimed=False,
         ),
         (
             *cells("standard", "ppo", "gaussian", "logit-normal", robots=NOISY),
