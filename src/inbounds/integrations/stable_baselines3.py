@@ -10,11 +10,12 @@ saturated action is scored exactly, its density cancels in every ratio, and an a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
-from gymnasium import spaces
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -23,7 +24,6 @@ from inbounds.distributions import LogitNormal
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
     from stable_baselines3.common.policies import ActorCriticPolicy
-    from stable_baselines3.common.type_aliases import Schedule
 except ImportError as error:
     raise ImportError('stable-baselines3 is not installed: pip install "inbounds[integrations]"') from error
 
@@ -105,13 +105,13 @@ class LogitNormalPolicy(ActorCriticPolicy):
 
     def __init__(
         self,
-        observation_space: spaces.Space[Any],
-        action_space: spaces.Space[Any],
-        lr_schedule: Schedule,
+        observation_space: gymnasium.spaces.Space[Any],
+        action_space: gymnasium.spaces.Space[Any],
+        lr_schedule: Callable[[float], float],
         **options: Any,
     ) -> None:
         if (
-            not isinstance(action_space, spaces.Box)
+            not isinstance(action_space, gymnasium.spaces.Box)
             or len(action_space.shape) != 1
             or not action_space.is_bounded()
         ):
@@ -124,7 +124,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
         super().__init__(observation_space, action_space, lr_schedule, **options)
         self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
 
-    def _build(self, lr_schedule: Schedule) -> None:
+    def _build(self, lr_schedule: Callable[[float], float]) -> None:
         """Put our law in the place of the peer's choice before it builds the heads."""
         self.action_dist = LogitNormalDistribution(*self._bounds)
         super()._build(lr_schedule)

@@ -31,9 +31,7 @@ except ImportError as error:
 
 __all__ = ["PARAMETERS", "Latents", "bounded_actor"]
 
-Law = LogitNormal | ScaledBeta
-
-PARAMETERS: Mapping[type[Law], tuple[str, str]] = MappingProxyType(
+PARAMETERS: Mapping[type[LogitNormal | ScaledBeta], tuple[str, str]] = MappingProxyType(
     {LogitNormal: ("loc", "scale"), ScaledBeta: ("concentration1", "concentration0")}
 )
 """The two parameters `[..., A]` that a network must give for each law, in order."""
@@ -57,7 +55,7 @@ class Latents(Distribution):
 
     arg_constraints: ClassVar[dict[str, constraints.Constraint]] = {}
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: LogitNormal | ScaledBeta) -> None:
         self.law = law
         self.has_rsample = law.has_rsample
         super().__init__(law.batch_shape[:-1], law.batch_shape[-1:], validate_args=False)
@@ -88,7 +86,7 @@ def _kl_latents_latents(p: Latents, q: Latents) -> Tensor:
 
 def bounded_actor(
     network: nn.Module,
-    law: type[Law],
+    law: type[LogitNormal | ScaledBeta],
     low: TensorLike,
     high: TensorLike,
     in_keys: Sequence[str] = ("observation",),
