@@ -37,6 +37,7 @@ EXAMPLES = """
 examples:
   python -m benchmarks.validate                       10 seeds, 307 200 steps, two robots; about 45 minutes on two cores
   python -m benchmarks.validate --seeds 20            ten more seeds than before: what is there is not run again
+  python -m benchmarks.validate --seeds 10 20         ten on Hopper, twenty on HalfCheetah
   python -m benchmarks.validate --quick               does it run? half a minute
 """
 _epochs_done: Any = None  # a counter shared by all processes
@@ -265,7 +266,7 @@ def finish(done: Sequence[Job], margin: float) -> dict[str, Any]:
         "date": time.strftime("%Y-%m-%d", time.gmtime()),
         "machine": machine(),
         "versions": versions({}),
-        "seeds": len(done[0].seeds),
+        "seeds": {job.env: len(job.seeds) for job in done},
         "env_steps": done[0].epochs * done[0].horizon,
         "normalize_obs": done[0].normalize,
         "margin": margin,
@@ -287,7 +288,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--envs", nargs="+", default=["Hopper-v5", "HalfCheetah-v5"], help="Gymnasium's ids")
-    parser.add_argument("--seeds", type=int, default=10, help="of each side (10)")
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=[10], help="of each side (10): one number, or one per robot"
+    )
     parser.add_argument("--epochs", type=int, default=150, help="of 2048 steps each (150)")
     parser.add_argument(
         "--normalize", action="store_true", help="observations, by running statistics, on both sides"
@@ -303,15 +306,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     horizon = 2048
     if chosen.quick:
-        chosen.seeds, chosen.epochs, horizon = 2, 2, 256
+        chosen.seeds, chosen.epochs, horizon = [2], 2, 256
         chosen.envs, chosen.output = chosen.envs[:1], chosen.output / "quick"
-    if chosen.seeds < 2 or chosen.epochs < 1 or chosen.workers < 1:
+    if len(chosen.seeds) not in (1, len(chosen.envs)):
+        parser.error(
+            f"{len(chosen.seeds)} numbers of seeds for {len(chosen.envs)} robots: give one, or one per robot"
+        )
+    counts = chosen.seeds if len(chosen.seeds) > 1 else chosen.seeds * len(chosen.envs)
+    if min(counts) < 2 or chosen.epochs < 1 or chosen.workers < 1:
         parser.error("at least two seeds a side, one epoch and one worker are needed")
     (chosen.output / "runs").mkdir(parents=True, exist_ok=True)
     console = Console()
     sides = [
-        Job(env, who, tuple(range(chosen.seeds)), chosen.epochs, horizon, chosen.normalize, chosen.output)
-        for env in chosen.envs
+        Job(env, who, tuple(range(count)), chosen.epochs, horizon, chosen.normalize, chosen.output)
+        for env, count in zip(chosen.envs, counts, strict=True)
         for who in (OURS, PEER)
     ]
     if todo := jobs(sides):
