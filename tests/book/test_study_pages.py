@@ -76,7 +76,7 @@ def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path)
 
 def cells(view: Shown) -> list[list[str]]:
     return [
-        [cell.partition(">")[2].partition("<")[0] for cell in row.split("<td")[1:]]
+        [cell.partition(">")[2].partition("</td>")[0].replace("<br>", "\n") for cell in row.split("<td")[1:]]
         for row in view.html.partition("<tbody>")[2].split("<tr>")[1:]
     ]
 
@@ -103,10 +103,13 @@ def test_published_scores_stand_beside_ours(some: Outcomes) -> None:
 def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) -> None:
     found = [judge(some, claim) for claim in CHEAP]
     rows = cells(study_pages.ledger(found))
-    assert [row[2] for row in rows] == [each.verdict for each in found]
-    (wins,) = [row for row in rows if row[6] == "inbounds study ledger wins-ppo-standard"]
-    assert wins[5] == "4 of 12"
-    assert "missing: HalfCheetah" in wins[4]
+    assert [row[1].partition("\n")[0] for row in rows] == [each.verdict for each in found]
+    (wins,) = [row for row in rows if row[0].endswith("\ninbounds study ledger wins-ppo-standard")]
+    assert wins[1].endswith("\ncells: 4 of 12")
+    hopper, ant, missing = wins[2].split("\n")
+    assert hopper.startswith("Hopper: ")
+    assert ant.startswith("Ant: ")
+    assert missing == "missing: HalfCheetah, Swimmer, Walker2d, Humanoid"
     assert report_ledger.counted(found) in study_pages.ledger(found).html
     assert "1 refuted" in report_ledger.counted(found)
     assert "Refuted: " in study_pages.decided(found).html

@@ -105,6 +105,14 @@ def test_a_combination_of_two_groups_is_their_difference() -> None:
     assert (ours.value, ours.low, ours.high, ours.n) == (theirs.value, theirs.low, theirs.high, theirs.n)
 
 
+def test_a_weight_scales_a_group() -> None:
+    rng = np.random.default_rng(1)
+    a, b = rng.normal(3, 1, 10), rng.normal(1, 4, 9)
+    ours = combination([a, b], [1, -3], np.random.default_rng(0))
+    theirs = study_statistics.difference(a, 3 * b, np.random.default_rng(0), statistic="mean")
+    np.testing.assert_allclose([ours.value, ours.low, ours.high], [theirs.value, theirs.low, theirs.high])
+
+
 def test_a_combination_covers_what_it_estimates() -> None:
     """Half of a gap, four groups of ten: the interval is near that of the Normal law, whose width is known."""
     rng = np.random.default_rng(2)
@@ -296,6 +304,8 @@ def test_half_of_a_gap() -> None:
     assert (kept.state, closed.state) == ("for", "against")
     assert half_left("x", [middle, middle, high, low], ["closed"], claimed=False).state == "for"
     assert half_left("x", [high, low, middle, middle], ["none"], claimed=True).state == "moot"
+    hardly = half_left("x", [high, low, middle + 0.05, middle], ["hardly"], claimed=True)
+    assert hardly.state == "moot"  # a gap, but no clear one
     assert closed.estimate is not None
     assert closed.estimate.value == pytest.approx(-(high.mean() - low.mean()) / 2)
 

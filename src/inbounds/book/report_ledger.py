@@ -9,7 +9,7 @@ from inbounds.book import report_page as html
 from inbounds.study.ledger import Finding
 from inbounds.study.statistics.settings import LEVEL
 
-HEAD = ("claim", "where", "verdict", "test", "result", "finished cells", "command")
+HEAD = ("claim and test", "verdict", "result")
 _CAPTION = (
     f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
     "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible. Moot: there is "
@@ -25,13 +25,9 @@ def ledger_section(found: Sequence[Finding]) -> list[str]:
     """
     rows = [
         [
-            each.claim.says,
-            each.claim.where,
-            each.verdict,
-            each.claim.test,
-            f"{each.counted}. {each.told}",
-            each.cells,
-            each.claim.command,
+            f"{each.claim.says}\n({each.claim.where})\nTest: {each.claim.test}\n{each.claim.command}",
+            "\n".join([each.verdict, *each.counted.split("; "), f"cells: {each.cells}"]),
+            each.told,
         ]
         for each in found
     ]
@@ -53,7 +49,7 @@ def counted(found: Sequence[Finding]) -> str:
 def decided(found: Sequence[Finding]) -> list[str]:
     """Return the claims that are decided, as a list; a paragraph where none is."""
     told = [
-        f"{each.verdict.capitalize()}: {each.claim.says} ({each.told})"
+        f"{each.verdict.capitalize()}: {each.claim.says} ({', '.join(each.told.splitlines())})"
         for each in found
         if each.verdict != "undecided"
     ]

@@ -102,7 +102,7 @@ def table(
     Args:
         caption: what it shows, and of how many seeds.
         head: titles of the columns.
-        rows: each as long as the head.
+        rows: each as long as the head; a text may have lines.
         words: which columns hold words rather than numbers.
 
     Example:
@@ -111,10 +111,15 @@ def table(
     """
 
     def cell(tag: str, place: int, text: str) -> str:
-        looks = {"words": place in words, "missing": text == "missing", "long": len(text) > _LONG}
+        looks = {
+            "words": place in words,
+            "missing": text == "missing",
+            "long": max(map(len, text.split("\n"))) > _LONG,
+        }
         chosen = " ".join(name for name, wanted in looks.items() if wanted)
         attribute = f' class="{chosen}"' if chosen else ""
-        return f"<{tag}{attribute}>{escape(text)}</{tag.partition(' ')[0]}>"
+        lines = escape(text).replace("\n", "<br>")
+        return f"<{tag}{attribute}>{lines}</{tag.partition(' ')[0]}>"
 
     titles = "".join(cell('th scope="col"', i, title) for i, title in enumerate(head))
     body = "".join(

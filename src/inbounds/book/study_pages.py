@@ -188,4 +188,4 @@ def _of_arm(
 
 
 def _shown(what: str, parts: list[str]) -> Shown:
-    return Shown(what, "\n".join(parts))
+    return Shown(what, "\n".join(['<div class="inbounds-study">', *parts, "</div>"]))

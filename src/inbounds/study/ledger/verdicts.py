@@ -112,10 +112,13 @@ class Finding:
 
     @property
     def told(self) -> str:
-        """What the statements say, in words; those that are missing by name only."""
-        there = [str(statement) for statement in self.statements if statement.state != "missing"]
-        gone = [statement.about for statement in self.statements if statement.state == "missing"]
-        return "; ".join([*there, *([f"missing: {' · '.join(gone)}"] if gone else [])])
+        """What the statements say, a line each; those that are missing by name only, on the last."""
+        tails = {statement.about.partition(", ")[2] for statement in self.statements}
+        shared = f", {min(tails)}" if len(tails) == 1 and min(tails) else ""  # need not be said each time
+        there = [str(s).replace(shared, "", 1) for s in self.statements if s.state != "missing"]
+        gone = [s.about.removesuffix(shared) for s in self.statements if s.state == "missing"]
+        listed = (", " if shared else "; ").join(gone)
+        return "\n".join([*there, *([f"missing: {listed}"] if gone else [])])
 
     @property
     def counted(self) -> str:
