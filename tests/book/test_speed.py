@@ -35,6 +35,7 @@ def rows(html: str) -> list[list[str]]:
 
 
 def test_ratios_are_paired_and_the_floor_comes_last(results: Any) -> None:
+    assert speed.median_ratio(results, "Hopper-v5", "inbounds-ppo-10", "sb3-ppo") == 10
     assert rows(speed.ratio_table(results).html) == [
         ["In Bounds PPO, S = 10, over stable-baselines3 PPO", "10.00 (10.00 to 20.00)", "–"],
         [
@@ -131,7 +132,8 @@ def validation(folder: Path) -> Any:
         "Ant-v5": sides | decided | {"equivalent": False, "seeds_needed": 31},
         "Walker2d-v5": sides | {"undecided": "train longer"},
     }
-    found = {"seeds": 3, "env_steps": 8192, "margin": 0.15, "verdicts": verdicts}
+    seeds = {"Hopper-v5": 3, "Ant-v5": 4, "Walker2d-v5": 3}
+    found = {"seeds": seeds, "env_steps": 8192, "margin": 0.15, "verdicts": verdicts}
     (folder / "validation.json").write_text(json.dumps(found))
     return speed.read_validation(folder)
 
@@ -143,8 +145,23 @@ def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
     assert hopper == ["Hopper-v5", *same, "1.01 (0.93 to 1.10)", "0.012", "equivalent"]
     assert ant[-1].startswith("not shown; with equal means 31 seeds")
     assert walker == ["Walker2d-v5", *same, "–", "–", "undecided: train longer"]
-    assert "3 seeds a side, 8,192 env steps" in html
+    assert "seeds a side (3 on Hopper-v5, 4 on Ant-v5, 3 on Walker2d-v5), 8,192 env steps" in html
     assert "within ± 15%" in html
+
+
+def test_areas_above_the_start_do_not_depend_on_where_zero_is(tmp_path: Path) -> None:
+    found = validation(tmp_path)
+    here = speed.above_the_start(found, "Hopper-v5")
+    returns = pa.array(found["curves"]["return_mean"].to_numpy() + 1000.0)
+    column = found["curves"].schema.get_field_index("return_mean")
+    there = speed.above_the_start(
+        {**found, "curves": found["curves"].set_column(column, "return_mean", returns)}, "Hopper-v5"
+    )
+    assert there["start"] - here["start"] == pytest.approx(1000)
+    for key in ("ratio", "low", "high"):
+        assert there[key] == pytest.approx(here[key])
+    assert here["ratio"] == pytest.approx(1, abs=0.02)  # both sides climb by 150 on average
+    assert there["margin"] - here["margin"] == pytest.approx(150)  # 15 % of another zero
 
 
 def test_half_a_validation_is_none(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ The text form of a table holds no number: the stored notebook stays the same whe
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import json
 import re
@@ -20,6 +21,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
+
+import numpy as np
 
 from inbounds.book import alt_text
 from inbounds.book.report_page import bullets, paragraph, table
@@ -127,6 +130,18 @@ def rate_table(results: Results | None) -> Shown:
     return Shown(what, table("Env steps per second: median (range).", ["Who", *measured], rows))
 
 
+def median_ratio(results: Results, env: str, ours: str, theirs: str) -> float:
+    """Return the median over the repeats of one contestant's steps per second over another's.
+
+    Args:
+        results: from `read_speed`.
+        env: a robot.
+        ours: name of a contestant of the benchmark.
+        theirs: another.
+    """
+    return float(np.median(_benchmarks("report").ratio(results, env, ours, theirs)))
+
+
 def how_measured(results: Results | None) -> Shown:
     """Return the circumstances of the benchmark: date, command, machine, versions, work, who could not take part."""
     what = "speed: how it was measured"
@@ -167,11 +182,38 @@ def verdict_table(validation: Results | None) -> Shown:
         f"within ± {validation['margin']:.0%}",
     ]
     rows = [[env, *_verdict(found, who)] for env, found in validation["verdicts"].items()]
+    seeds = ", ".join(f"{count} on {env}" for env, count in validation["seeds"].items())
     caption = (
-        f"Mean area under the learning curve ± standard deviation over {validation['seeds']} seeds a side, "
+        f"Mean area under the learning curve ± standard deviation over seeds a side ({seeds}), "
         f"{validation['env_steps']:,} env steps each."
     )
     return Shown(what, table(caption, head, rows, words=(0, 5)))
+
+
+def above_the_start(validation: Results, env: str) -> dict[str, Any]:
+    """Return the areas between the learning curves and where they start, compared as the validation compares areas.
+
+    A return's zero is a convention of the task. Areas above the start, the mean return of the first epoch over all
+    seeds of both sides, do not depend on it.
+
+    Args:
+        validation: from `read_validation`.
+        env: one of its robots.
+
+    Returns:
+        `start`, `margin` (the share of the peer's mean area, in returns), and the fields of
+        `benchmarks.equivalence.Equivalence` for the areas above the start.
+    """
+    who, test = _benchmarks("validate"), _benchmarks("equivalence")
+    returns = [who.curves(validation["curves"], env, side) for side in (who.OURS, who.PEER)]
+    ours, theirs = (test.area(each) for each in returns)
+    start = float(np.nanmean(np.concatenate([each[:, 0] for each in returns])))
+    found = test.equivalence(ours - start, theirs - start, validation["margin"])
+    return {
+        "start": start,
+        "margin": float(validation["margin"] * theirs.mean()),
+        **dataclasses.asdict(found),
+    }
 
 
 def show_validation(validation: Results | None) -> None:
