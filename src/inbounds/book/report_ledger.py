@@ -9,7 +9,7 @@ from inbounds.book import report_page as html
 from inbounds.study.ledger import Finding
 from inbounds.study.statistics.settings import LEVEL
 
-HEAD = ("claim and test", "verdict", "result")
+HEAD = ("claim and test", "verdict and result")
 _CAPTION = (
     f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
     "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible. Moot: there is "
@@ -26,8 +26,7 @@ def ledger_section(found: Sequence[Finding]) -> list[str]:
     rows = [
         [
             f"{each.claim.says}\n({each.claim.where})\nTest: {each.claim.test}\n{each.claim.command}",
-            "\n".join([each.verdict, *each.counted.split("; "), f"cells: {each.cells}"]),
-            each.told,
+            f"{each.verdict.upper()}\n{each.counted}\ncells: {each.cells}\n{each.told}",
         ]
         for each in found
     ]
