@@ -9,7 +9,7 @@ from inbounds.book import report_page as html
 from inbounds.study.ledger import Finding
 from inbounds.study.statistics.settings import LEVEL
 
-HEAD = ("claim and test", "verdict and result")
+HEAD = ("claim", "verdict, test and result")
 _CAPTION = (
     f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
     "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible. Moot: there is "
@@ -25,8 +25,8 @@ def ledger_section(found: Sequence[Finding]) -> list[str]:
     """
     rows = [
         [
-            f"{each.claim.says}\n({each.claim.where})\nTest: {each.claim.test}\n{each.claim.command}",
-            f"{each.verdict.upper()}\n{each.counted}\ncells: {each.cells}\n{each.told}",
+            f"{each.claim.says}\n({each.claim.where})\n{each.claim.command}",
+            f"{each.verdict.upper()}\n{each.counted}\ncells: {each.cells}\nTest: {each.claim.test}\n{each.told}",
         ]
         for each in found
     ]
