@@ -60,12 +60,14 @@ def our_side(config: TrainConfig) -> tuple[Trainer, Rollout]:
     return trainer, rollout
 
 
-def their_side(kind: type[OnPolicyAlgorithm], config: TrainConfig, **settings: Any) -> Any:
+def their_side(
+    kind: type[OnPolicyAlgorithm], config: TrainConfig, env: gymnasium.Env | None = None, **settings: Any
+) -> Any:
     """Return the peer's algorithm in float64, with the numbers that both sides call the same."""
     algorithm = config.algorithm
     peer: Any = kind(
         "MlpPolicy",
-        gymnasium.make(ENV),
+        env or gymnasium.make(ENV),
         n_steps=algorithm.horizon,
         batch_size=algorithm.minibatch_size,
         gamma=algorithm.gamma,
