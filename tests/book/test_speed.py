@@ -100,11 +100,12 @@ def test_the_stored_text_is_the_same_measured_or_not(results: Any, on_page: list
 
 
 def test_the_plot_has_its_alt_text(results: Any, on_page: list) -> None:
+    before = plt.get_fignums()
     speed.show_speed(results)
     ((data, metadata),) = on_page
     assert "logarithmic axis" in metadata["image/png"]["alt"]
     assert not any(character.isdigit() for character in data["text/plain"])
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == before
 
 
 def validation(folder: Path) -> Any:

@@ -8,6 +8,10 @@ environment:
     actor, acting = bounded_actor(network, LogitNormal, low, high)
     loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
     batch = env.rollout(1000, acting)       # writes both, and "action"
+
+Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: a
+NaN, or an action beyond its bounds, then raises nothing. `torch.distributions.Distribution.set_default_validate_args`
+switches them on again.
 """
 
 from __future__ import annotations
