@@ -1,7 +1,6 @@
 """The laws of the book in TorchRL: losses read latents, environments get actions, and TanhNormal is an old friend."""
 
 import warnings
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,9 +9,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import nn
-from torch.distributions import Distribution, kl_divergence
+from torch.distributions import kl_divergence
 
-CHECKED = Distribution._validate_args
 with warnings.catch_warnings():  # the library warns of its own deprecations while it is imported
     warnings.simplefilter("ignore")
     from tensordict import TensorDict
@@ -26,15 +24,7 @@ from inbounds.integrations.torchrl import PARAMETERS, Latents, bounded_actor
 from tests.integrations.tank import HIGH, HORIZON, LOW, Tank
 
 LAWS = (LogitNormal, ScaledBeta)
-# While it is imported, TorchRL switches off the checks of every torch distribution; other tests need them.
-Distribution.set_default_validate_args(CHECKED)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _as_torchrl_leaves_it() -> Iterator[None]:
-    Distribution.set_default_validate_args(False)
-    yield
-    Distribution.set_default_validate_args(CHECKED)
+CHECKED_ARGUMENTS = False  # as TorchRL leaves it, and as its own distributions need it
 
 
 class BetaHead(nn.Module):
