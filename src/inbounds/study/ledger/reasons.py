@@ -7,7 +7,7 @@ from scipy.special import logit
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import computed
 from inbounds.study.ledger.evidence import costs, exceeds, half_remains, learns
-from inbounds.study.ledger.naming import NOISY, cells
+from inbounds.study.ledger.naming import AS_THEY_START, EQUALLY_LOUD, LOUDNESS_CELLS, NOISY, cells
 from inbounds.study.ledger.verdicts import Claim
 from inbounds.study.outcomes import Column
 
@@ -21,18 +21,12 @@ CAUSES = [
         "Final return: with equal executed noise at the start, at least half of the gain (logit-normal − "
         "Gaussian) is left on every robot that has one.",
         half_remains(
-            (
-                Column("mechanisms", "ppo", "logit-normal", "matched-noise"),
-                Column("mechanisms", "ppo", "gaussian", "matched-noise"),
-            ),
-            (Column("standard", "ppo", "logit-normal"), Column("standard", "ppo", "gaussian")),
+            EQUALLY_LOUD,
+            AS_THEY_START,
             NOISY,
             "final",
         ),
-        (
-            *cells("standard", "ppo", "gaussian", "logit-normal", robots=NOISY),
-            *cells("mechanisms", "ppo", "gaussian-matched-noise", "logit-normal-matched-noise"),
-        ),
+        LOUDNESS_CELLS,
     ),
     Claim(
         "cause-capg",

@@ -18,7 +18,16 @@ from inbounds.study.ledger.evidence import (
     improves,
     together,
 )
-from inbounds.study.ledger.naming import NOISY, PRESETS, TEST, cells, squash
+from inbounds.study.ledger.naming import (
+    AS_THEY_START,
+    EQUALLY_LOUD,
+    LOUDNESS_CELLS,
+    NOISY,
+    PRESETS,
+    TEST,
+    cells,
+    squash,
+)
 from inbounds.study.ledger.verdicts import Claim
 from inbounds.study.outcomes import Column
 
@@ -56,19 +65,13 @@ STARTS = [
         "First epoch: with equal executed noise (0.4) less than half of the gap (logit-normal − Gaussian) is left on "
         "every robot that has one.",
         half_remains(
-            (
-                Column("mechanisms", "ppo", "logit-normal", "matched-noise"),
-                Column("mechanisms", "ppo", "gaussian", "matched-noise"),
-            ),
-            (Column("standard", "ppo", "logit-normal"), Column("standard", "ppo", "gaussian")),
+            EQUALLY_LOUD,
+            AS_THEY_START,
             NOISY,
             START,
             claimed=False,
         ),
-        (
-            *cells("standard", "ppo", "gaussian", "logit-normal", robots=NOISY),
-            *cells("mechanisms", "ppo", "gaussian-matched-noise", "logit-normal-matched-noise"),
-        ),
+        LOUDNESS_CELLS,
     ),
     Claim(
         "start-raw",
