@@ -25,6 +25,7 @@ CODE = (
     "src",
     "results",
     "benchmarks/contestants.py",
+    "benchmarks/equivalence.py",
     "benchmarks/report.py",
     "benchmarks/validate.py",
     "benchmarks/results/speed.json",
