@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.pages import browser as book
 
+PATIENCE = 300_000  # milliseconds: a chapter's picture is tall, and the machine may be busy
 LOOKS = {
     "light": (book.DESKTOP, "light"),
     "dark": (book.DESKTOP, "dark"),
@@ -21,6 +22,7 @@ def main(folder: Path, names: list[str]) -> None:
     with book.served(book.HTML) as address, book.chromium() as browser:
         for look, (viewport, theme) in LOOKS.items():
             context = browser.new_context(viewport=viewport)
+            context.set_default_timeout(PATIENCE)
             context.add_init_script(book.choose_theme(theme))
             for name in names or book.pages():
                 page = context.new_page()
@@ -29,7 +31,7 @@ def main(folder: Path, names: list[str]) -> None:
                 path = folder / f"{name.removesuffix('.html').replace('/', '-')}-{look}.png"
                 page.screenshot(path=path, full_page=True)
                 page.close()
-                print(path)
+                print(path, flush=True)
             context.close()
 
 
