@@ -120,6 +120,18 @@ def test_a_figure_of_few_seeds_says_that_its_intervals_fall_short() -> None:
     assert "95% bootstrap interval (so few seeds cover 87.5% at most). n = 4 seeds." in words(fig)
 
 
+def test_a_panel_without_any_cell_has_no_scale() -> None:
+    bars = study_figures.interval_panels(
+        {"Ant-v5": {"beta": estimate(scores(0))}, "Hopper-v5": {"beta": None}}
+    )
+    lines = study_figures.learning_curves({"Ant-v5": {"beta": curve(0)}, "Hopper-v5": {"beta": None}})
+    for fig in (bars, lines):
+        fig.canvas.draw()
+        drawn, empty = ([t.get_text() for t in ax.get_xticklabels() if t.get_visible()] for ax in fig.axes)
+        assert any(drawn)
+        assert not any(empty)
+
+
 def test_a_row_keeps_its_place_where_its_cell_is_missing_and_is_hollow_where_a_seed_is() -> None:
     lost = np.where(np.arange(10) == 3, np.nan, scores(0))
     cells = {

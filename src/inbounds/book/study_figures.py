@@ -30,6 +30,7 @@ from inbounds.book.study_panels import (
     lowest,
     note,
     panel_grid,
+    without_scale,
 )
 from inbounds.study.statistics import Comparison, Estimate, Profile
 
@@ -82,6 +83,8 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
             list_gaps(ax, {family: c.estimate if c else None for family, c in cells.items()})
             ax.yaxis.set_major_locator(MaxNLocator(5))
             ax.xaxis.set_major_locator(MaxNLocator(5))
+            if not any(cells.values()):
+                without_scale(ax, "both")
         fig.supylabel(ylabel, fontsize=13)
         for ax in lowest(axes):
             ax.set_xlabel("env steps per seed [millions]")
@@ -214,6 +217,8 @@ def _bars(
             ax.grid(visible=False, axis="y")
             ax.margins(x=0.12)
             ax.xaxis.set_major_locator(MaxNLocator(3))
+            if not any(estimate for estimate, _ in given.values()):
+                without_scale(ax, "x")
         # One label for all panels; below them it would lie on the note, which the layout engine places there.
         fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
         drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]

@@ -69,11 +69,12 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
 
 def differences(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     """Return the differences between families: final returns as a figure, all endpoints as a table with tests."""
-    parts = report_arms.differences(outcomes, arm, algorithm)
-    parts += report_arms.without_diverged(
-        outcomes, arm, algorithm, report_arms.cells_of(outcomes, arm, algorithm)
-    )
-    return _shown(f"study: differences, {report_arms.title_of(arm, algorithm)}", parts)
+
+    def parts(_: str, cells: Cells) -> list[str]:
+        found = report_arms.differences(outcomes, arm, algorithm)
+        return found + report_arms.without_diverged(outcomes, arm, algorithm, cells)
+
+    return _of_arm("differences", outcomes, arm, algorithm, parts)
 
 
 def inside(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -72,6 +72,12 @@ def list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = 
     if lines and at_left:
         bottom, top = ax.get_ylim()
         ax.set_ylim(bottom, top + 0.12 * len(lines) * (top - bottom))
+
+
+def without_scale(ax: Any, axis: Literal["x", "both"]) -> None:
+    """Take the numbers off a panel that has nothing to be read against them."""
+    ax.tick_params(axis=axis, length=0, labelbottom=False, labelleft=False)
+    ax.grid(visible=False, axis=axis)
 
 
 def family_legend(fig: Figure, families: list[str]) -> None:
