@@ -19,10 +19,6 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-import yaml
-from jupyter_cache import get_cache
-from jupyter_cache.executors import load_executor
-
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "_build"
 INDEX = BUILD / "html" / "index.html"
@@ -57,11 +53,17 @@ def digest(*names: str) -> str:
 
 def execute_one(cache: str, key: int, timeout: int) -> None:
     """Execute a notebook of the cache's project, unless the cache has it already; called in a process of its own."""
+    from jupyter_cache import get_cache
+    from jupyter_cache.executors import load_executor
+
     load_executor("local-serial", get_cache(cache)).run_and_cache(filter_pks=[key], timeout=timeout)
 
 
 def execute(cache: Path) -> None:
     """Execute what the cache lacks. What fails is not cached: Jupyter Book runs it again, and says what is wrong."""
+    import yaml  # not above, like the cache: mostly nothing changed, and then neither is needed
+    from jupyter_cache import get_cache
+
     timeout = yaml.safe_load((ROOT / "_config.yml").read_text())["execute"]["timeout"]  # of a cell, seconds
     project, start = get_cache(cache), time.perf_counter()
     keys = {
