@@ -50,8 +50,8 @@ def arm_section(outcomes: Outcomes, arm: str) -> list[str]:
         title = title_of(arm, algorithm)
         cells = cells_of(outcomes, arm, algorithm)
         parts.append(html.heading(title, 3))
-        if not any(outcome for row in cells.values() for outcome in row.values()):
-            parts.append(html.paragraph("missing: none of these cells is finished.", "missing"))
+        if not any_finished(cells):
+            parts.append(NONE_FINISHED)
             continue
         parts += curves(title, cells)
         parts += endpoints(title, cells)
@@ -66,11 +66,19 @@ def arm_section(outcomes: Outcomes, arm: str) -> list[str]:
 Cells = Mapping[str, Mapping[str, Outcome | None]]
 """By robot and family."""
 
+NONE_FINISHED = html.paragraph("missing: none of these cells is finished.", "missing")
+"""What a page shows in place of anything about cells of which `any_finished` is false."""
+
 
 def cells_of(outcomes: Outcomes, arm: str, algorithm: str) -> Cells:
     """Return the cells that an arm compares under an algorithm."""
     columns = columns_of(arm, algorithm)
     return {robot: {f: outcomes.find(c, robot) for f, c in columns.items()} for robot in ROBOTS}
+
+
+def any_finished(cells: Cells) -> bool:
+    """Say whether at least one of these cells is finished."""
+    return any(outcome for row in cells.values() for outcome in row.values())
 
 
 def curves(title: str, cells: Cells) -> list[str]:

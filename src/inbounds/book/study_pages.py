@@ -182,10 +182,8 @@ def _of_arm(
 ) -> Shown:
     title = report_arms.title_of(arm, algorithm)
     cells = report_arms.cells_of(outcomes, arm, algorithm)
-    if not any(outcome for row in cells.values() for outcome in row.values()):
-        lacking = [html.paragraph("missing: none of these cells is finished.", "missing")]
-        return _shown(f"study: {what}, {title}", lacking)
-    return _shown(f"study: {what}, {title}", parts(title, cells))
+    told = parts(title, cells) if report_arms.any_finished(cells) else [report_arms.NONE_FINISHED]
+    return _shown(f"study: {what}, {title}", told)
 
 
 def _shown(what: str, parts: list[str]) -> Shown:

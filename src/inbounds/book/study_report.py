@@ -12,7 +12,7 @@ from pathlib import Path
 
 from inbounds.book import report_page as html
 from inbounds.book.figures import FAMILIES
-from inbounds.book.report_arms import HEADS, TITLES, arm_section
+from inbounds.book.report_arms import HEADS, NONE_FINISHED, TITLES, arm_section
 from inbounds.book.report_ledger import ledger_section
 from inbounds.book.report_words import spoken
 from inbounds.book.study_figures import interval_panels
@@ -123,7 +123,7 @@ def changes(outcomes: Outcomes, word: str) -> list[str]:
     """
     cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
     if not any(cell.id in outcomes.finished for cell in cells):
-        return [html.paragraph("missing: none of these cells is finished.", "missing")]
+        return [NONE_FINISHED]
     return _changes(outcomes, GROUPS[word], cells)
 
 
