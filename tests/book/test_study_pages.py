@@ -141,13 +141,6 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
     assert "Refuted: " in study_pages.decided(found).html
 
 
-def test_verdicts_in_words(some: Outcomes) -> None:
-    (wins,) = (judge(some, claim) for claim in claims_named(["wins-ppo-standard"]))
-    assert study_pages.verdict_of(wins) == "undecided: 4 of 12 cells are finished"
-    (centres,) = (judge(some, claim) for claim in claims_named(["centres"]))
-    assert study_pages.verdict_of(centres).startswith("refuted (1 against")
-
-
 def test_the_middle_seed_is_in_the_middle(some: Outcomes) -> None:
     outcome = some.finished["standard-hopper-ppo-beta"]
     returns = outcome.ways["median"]

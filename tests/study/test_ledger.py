@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,21 @@ from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, select, study_cells
 from inbounds.study import statistics as study_statistics
 from inbounds.study.grid import ROBOTS
-from inbounds.study.ledger import CLAIMS, Claim, Finding, claims_named, count, evidence, judge
+from inbounds.study.ledger import (
+    CLAIMS,
+    Claim,
+    Finding,
+    Statement,
+    claims_named,
+    count,
+    evidence,
+    judge,
+    possible_verdicts,
+)
 from inbounds.study.ledger.evidence import MARGIN, combination, costs, equals, side
 from inbounds.study.ledger.halves import half_left
 from inbounds.study.ledger.naming import squash
-from inbounds.study.ledger.verdicts import State
+from inbounds.study.ledger.verdicts import STATES, State
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import Estimate
 from tests.study.small import folder_in
@@ -28,7 +40,6 @@ from tests.study.synthetic import write_cells
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
-STATES: tuple[State, ...] = ("for", "against", "open", "moot", "missing")
 FROM_CELLS = [claim for claim in CLAIMS if claim.cells]
 
 
@@ -73,6 +84,38 @@ def test_where_there_is_nothing_to_explain_nothing_is_decided() -> None:
     assert count(["moot", "moot"]) == count(["missing"]) == count(["open"]) == "undecided"
     assert count(["moot", "for"]) == "supported"
     assert count(["moot", "against", "missing"]) == "refuted"
+
+
+@given(st.lists(st.sampled_from(STATES[:4]), max_size=5), st.integers(0, 4), st.none() | st.integers(1, 8))
+@settings(deadline=None, max_examples=100)
+def test_what_is_out_of_reach_is_what_no_way_to_fill_in_gives(
+    settled: list[State], others: int, needed: int | None
+) -> None:
+    """All orders of all states, one by one, instead of their counts."""
+    ways = [list(fill) for fill in product(STATES, repeat=others)]
+    reached = {count([*settled, *fill], needed) for fill in ways}
+    assert possible_verdicts(settled, others, needed) == reached
+
+
+def test_the_outlook_in_words() -> None:
+    def outlook(*statements: Statement, needed: int | None = None) -> str:
+        claim = replace(CLAIMS[0], needed=needed)
+        return Finding(claim, statements, 0, 0).outlook
+
+    found, lost = (
+        Statement("a", "for", estimate(1, 2), 0.01),
+        Statement("b", "against", estimate(-2, -1), 0.01),
+    )
+    wide, absent = Statement("c", "open", estimate(-1, 1), 0.9), Statement("d", "missing")
+    by_holm, uncorrected = Statement("e", "open", estimate(1, 2), 0.2), Statement("f", "open", estimate(1, 2))
+    assert outlook(absent, absent) == outlook(found, absent) == ""
+    assert outlook(found) == outlook(lost) == "", "decided"
+    assert outlook(wide, absent) == "can no longer be supported"
+    assert outlook(found, absent, absent, needed=2) == ""
+    assert outlook(found, wide, absent, needed=2) == "can no longer be refuted"
+    assert outlook(found, wide, wide, absent, needed=3) == "stays undecided"
+    assert outlook(wide, found) == outlook(uncorrected, found) == "stays undecided"
+    assert outlook(by_holm, found) == "", "a smaller factor may let the test find it"
 
 
 def estimate(low: float, high: float) -> Estimate:
@@ -281,6 +324,21 @@ def test_a_statement_names_the_cells_it_needs(made_up: Outcomes) -> None:
             assert missing, f"{claim.id} does without {cell.id}"
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_whole_study_decides_within_what_a_part_of_it_leaves_open(made_up: Outcomes, seed: int) -> None:
+    """Without some of the cells a claim says what is out of reach; with all of them it keeps its word."""
+    rng = np.random.default_rng(seed)
+    kept = {name: cell for name, cell in made_up.finished.items() if rng.random() < 0.6}
+    part = Outcomes(kept, made_up.states, made_up.folder)
+    for claim in FROM_CELLS:
+        before, after = judge(part, claim), judge(made_up, claim).verdict
+        if before.verdict != "undecided":
+            assert after == before.verdict, claim.id
+        else:
+            assert before.outlook != f"can no longer be {after}", claim.id
+            assert before.outlook != "stays undecided" or after == "undecided", claim.id
+
+
 # ---- what needs no cell
 
 
@@ -415,5 +473,5 @@ def test_claims_have_names_of_their_own_and_cells_of_the_study() -> None:
 def test_words() -> None:
     found = Finding(CLAIMS[0], (), 2, 12)
     assert found.cells == "2 of 12"
-    assert found.counted == "; needed: 0"
+    assert found.counted == "needed: 0; stays undecided"
     assert found.verdict == "undecided"

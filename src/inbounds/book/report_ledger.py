@@ -7,13 +7,15 @@ from collections.abc import Sequence
 
 from inbounds.book import report_page as html
 from inbounds.study.ledger import Finding
+from inbounds.study.ledger.verdicts import STAYS
 from inbounds.study.statistics.settings import LEVEL
 
 HEAD = ("claim", "verdict, test and result")
 _CAPTION = (
     f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
     "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible. Moot: there is "
-    "nothing to explain. Exploratory: the protocol does not list such a number."
+    "nothing to explain. Exploratory: the protocol does not list such a number. Stays undecided: no missing cell can "
+    "decide it."
 )
 
 
@@ -43,7 +45,9 @@ def counted(found: Sequence[Finding]) -> str:
     """
     verdicts = Counter(each.verdict for each in found)
     told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in ("supported", "refuted", "undecided"))
-    return f"{len(found)} claims: {told}."
+    stay = sum(each.outlook == STAYS for each in found)
+    rest = f", of which {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives" if stay else ""
+    return f"{len(found)} claims: {told}{rest}."
 
 
 def decided(found: Sequence[Finding]) -> list[str]:

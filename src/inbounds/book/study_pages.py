@@ -166,17 +166,6 @@ def decided(found: list[Finding]) -> Shown:
     return _shown("study: what is decided", report_ledger.decided(found))
 
 
-def verdict_of(finding: Finding) -> str:
-    """Say a claim's verdict in a sentence that stays true when cells arrive.
-
-    Args:
-        finding: of the claim.
-    """
-    if finding.verdict == "undecided" and finding.finished < finding.planned:
-        return f"undecided: {finding.cells} cells are finished"
-    return f"{finding.verdict} ({finding.counted})"
-
-
 def _of_arm(
     what: str, outcomes: Outcomes, arm: str, algorithm: str, parts: Callable[[str, Cells], list[str]]
 ) -> Shown:

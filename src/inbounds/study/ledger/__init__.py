@@ -16,9 +16,9 @@ from collections.abc import Sequence
 
 from inbounds.study.ledger.reasons import CAUSES, PARTS, TRUST
 from inbounds.study.ledger.results import STARTS, SWIMMER, WINS
-from inbounds.study.ledger.verdicts import Claim, Finding, Statement, count, judge
+from inbounds.study.ledger.verdicts import Claim, Finding, Statement, count, judge, possible_verdicts
 
-__all__ = ["CLAIMS", "Claim", "Finding", "Statement", "claims_named", "count", "judge"]
+__all__ = ["CLAIMS", "Claim", "Finding", "Statement", "claims_named", "count", "judge", "possible_verdicts"]
 
 CLAIMS = (*STARTS, *WINS, *CAUSES, *PARTS, *SWIMMER, *TRUST)
 """All claims, in the order of the page."""

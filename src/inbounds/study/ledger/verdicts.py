@@ -12,6 +12,9 @@ So a cell that arrives later changes no verdict but "undecided": it fills in wha
 p-values of other robots, since a missing robot counts as the last in Holm's correction. Each kind of evidence says when
 a statement is for or against (`inbounds.study.ledger.evidence`).
 
+For the same reason one can say of an undecided claim what is out of reach: an interval that leaves both possible stays
+as it is, whatever else arrives (`possible_verdicts`).
+
 The protocol of the study fixes endpoints, differences, tests and intervals. This rule, the margins and the list of
 claims were added when three of the 136 cells were known: PPO on HalfCheetah, in standard practice. When a fourth was,
 TRPO × gaussian there, three things were mended, none of which has to do with these four: a loss counts as one that
@@ -24,7 +27,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from itertools import combinations_with_replacement
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
 
 from inbounds.study.grid import select
 from inbounds.study.outcomes import Outcomes
@@ -33,6 +39,9 @@ from inbounds.study.words import p_value, spoken
 
 State: TypeAlias = Literal["for", "against", "open", "moot", "missing"]
 Verdict: TypeAlias = Literal["supported", "refuted", "undecided"]
+STATES: tuple[State, ...] = get_args(State)
+STAYS = "stays undecided"
+"""Said of a claim that no cell can decide any more."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,16 @@ class Statement:
     """Decimals to be told; None suits returns."""
     exact: bool = False
     """Whether the number is an error of computing, which has no interval."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether it stays what it is, whatever cell arrives.
+
+        What is open by its interval does; what is open by Holm's correction alone may yet be found.
+        """
+        if self.estimate is None or self.state != "open" or np.isnan(self.p_adjusted):
+            return self.state != "missing"
+        return float(self.estimate.low) <= 0 <= float(self.estimate.high)
 
     def __str__(self) -> str:
         if self.estimate is None:
@@ -120,6 +139,18 @@ class Finding:
         return count([statement.state for statement in self.statements], self.claim.needed)
 
     @property
+    def outlook(self) -> str:
+        """What cells that are not finished cannot change, in words; empty where they may decide either way."""
+        if self.verdict != "undecided":
+            return ""
+        settled = [statement.state for statement in self.statements if statement.settled]
+        possible = possible_verdicts(settled, len(self.statements) - len(settled), self.claim.needed)
+        if possible == {"undecided"}:
+            return STAYS
+        gone = [verdict for verdict in ("supported", "refuted") if verdict not in possible]
+        return f"can no longer be {gone[0]}" if gone else ""
+
+    @property
     def cells(self) -> str:
         """How many cells are behind it, in words."""
         return f"{self.finished} of {self.planned}" if self.planned else "none needed"
@@ -144,7 +175,7 @@ class Finding:
             if states[state]
         ]
         needed = len(self.statements) - states["moot"] if self.claim.needed is None else self.claim.needed
-        return f"{', '.join(told)}; needed: {needed}"
+        return "; ".join(filter(None, [", ".join(told), f"needed: {needed}", self.outlook]))
 
 
 def count(states: Sequence[State], needed: int | None = None) -> Verdict:
@@ -167,6 +198,22 @@ def count(states: Sequence[State], needed: int | None = None) -> Verdict:
     if states.count("for") >= needed:
         return "supported"
     return "refuted" if states.count("against") > len(states) - needed >= 0 else "undecided"
+
+
+def possible_verdicts(settled: Sequence[State], others: int, needed: int | None = None) -> frozenset[Verdict]:
+    """Return the verdicts that a claim may still get.
+
+    Args:
+        settled: states of the statements that no other cell can change.
+        others: how many statements there are besides.
+        needed: as in `count`.
+
+    Example:
+        >>> sorted(possible_verdicts(["for", "open", "open", "open"], 2, needed=4))
+        ['undecided']
+    """
+    fills = combinations_with_replacement(STATES, others)
+    return frozenset(count([*settled, *fill], needed) for fill in fills)
 
 
 def judge(outcomes: Outcomes, claim: Claim) -> Finding:
