@@ -112,7 +112,7 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     assert len(rows) == 1 + 3 * 6
     assert all(row[2:] == ["missing", "", ""] * 3 for row in page.table("Differences of means (PPO")[1:])
     assert any("aggregates need all six robots" in text for text in page.missing)
-    assert page.table("What the parts of the cells ran on")[1][0] == "1"
+    assert page.table("What the cells ran on")[1][0] == "1"
 
 
 def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:

@@ -158,21 +158,22 @@ def provenance_section(outcomes: Outcomes) -> list[str]:
     """Return what the finished cells ran on, and what they cost."""
     if not outcomes.finished:
         return [html.paragraph("missing: no cell is finished.", "missing")]
-    sessions = Counter(
-        _session(session) for o in outcomes.finished.values() for session in o.metadata["sessions"]
+    parts = Counter(_ran_on(part) for o in outcomes.finished.values() for part in o.metadata["sessions"])
+    rows = [[str(count), *key] for key, count in parts.items()]
+    head = ["parts", "commit", "engine", "versions", "processor"]
+    caption = (
+        "What the cells ran on. A cell that was stopped and resumed has several parts; + after a commit: the engine "
+        "differed from it."
     )
-    rows = [[str(count), *key] for key, count in sessions.items()]
-    head = ["sessions", "commit", "engine", "versions", "processor"]
-    caption = "What the parts of the cells ran on; + after a commit: the engine differed from it."
     cost = html.paragraph(_cost(list(outcomes.finished.values())))
     return [html.table(caption, head, rows, (1, 2, 3, 4)), cost]
 
 
-def _session(session: dict[str, object]) -> tuple[str, ...]:
-    versions = session["versions"]
+def _ran_on(part: dict[str, object]) -> tuple[str, ...]:
+    versions = part["versions"]
     assert isinstance(versions, dict)
     said = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return str(session["commit"])[:10], str(session["engine"])[:10], said, str(session["processor"])
+    return str(part["commit"])[:10], str(part["engine"])[:10], said, str(part["processor"])
 
 
 def _cost(found: list[Outcome]) -> str:
