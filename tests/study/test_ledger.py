@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from scipy import stats
 from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, select, study_cells
 from inbounds.study import statistics as study_statistics
+from inbounds.study.analysis import CONTRASTS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import (
     CLAIMS,
@@ -34,7 +34,7 @@ from inbounds.study.ledger.halves import half_left
 from inbounds.study.ledger.naming import squash
 from inbounds.study.ledger.verdicts import STATES, State
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.statistics import Estimate
+from inbounds.study.statistics import Comparison, Estimate
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
@@ -86,36 +86,77 @@ def test_where_there_is_nothing_to_explain_nothing_is_decided() -> None:
     assert count(["moot", "against", "missing"]) == "refuted"
 
 
-@given(st.lists(st.sampled_from(STATES[:4]), max_size=5), st.integers(0, 4), st.none() | st.integers(1, 8))
-@settings(deadline=None, max_examples=100)
-def test_what_is_out_of_reach_is_what_no_way_to_fill_in_gives(
-    settled: list[State], others: int, needed: int | None
+ENDS = {"above": (1.0, 2.0), "across": (-1.0, 1.0), "below": (-2.0, -1.0)}
+
+
+def of_six(rows: list[tuple[str, float]], gone: set[int], below: set[int]) -> list[Statement]:
+    """Statements on six robots from where an interval lies and its raw p-value."""
+    p_values = [np.nan if i in gone else p for i, (_, p) in enumerate(rows)]
+    compared = {
+        robot: Comparison(None if i in gone else estimate(*ENDS[rows[i][0]]), p_values[i], float(p))
+        for i, (robot, p) in enumerate(zip(ROBOTS, study_statistics.holm(p_values), strict=True))
+    }
+    ahead = [robot for i, robot in enumerate(ROBOTS) if i not in below]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evidence, "_compared", lambda *_: compared)
+        found = evidence.beats(CONTRASTS[0], robots=ahead, below=[r for r in ROBOTS if r not in ahead])
+        return list(found(Outcomes({}, {}, SHIPPED)))
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(list(ENDS)), st.sampled_from([1e-4, 0.004, 0.009, 0.015, 0.03, 0.2])),
+        min_size=6,
+        max_size=6,
+    ),
+    st.sets(st.integers(0, 5)),
+    st.sets(st.integers(0, 5)),
+    st.none() | st.integers(1, 6),
+)
+@settings(deadline=None, max_examples=300)
+def test_the_outlook_keeps_its_word(
+    rows: list[tuple[str, float]], gone: set[int], below: set[int], needed: int | None
 ) -> None:
-    """All orders of all states, one by one, instead of their counts."""
-    ways = [list(fill) for fill in product(STATES, repeat=others)]
-    reached = {count([*settled, *fill], needed) for fill in ways}
-    assert possible_verdicts(settled, others, needed) == reached
+    """What cells make of a claim was not out of reach before; when all are there, nothing is left open to them."""
+    part, whole = of_six(rows, gone, below), of_six(rows, set(), below)
+    for before, after in zip(part, whole, strict=True):
+        assert after.state in before.reachable
+        assert after.reachable == (after.state,)
+    verdict = count([each.state for each in whole], needed)
+    assert verdict in possible_verdicts([each.reachable for each in part], needed)
+    assert possible_verdicts([each.reachable for each in whole], needed) == {verdict}
+
+
+def test_what_holm_leaves_open_may_be_found_where_its_p_can_fall_below_the_level() -> None:
+    def first(p: float, gone: set[int]) -> Statement:
+        return of_six([("above", p), *[("across", 0.9)] * 5], gone, set())[0]
+
+    assert (first(0.009, {4, 5}).state, first(0.009, {4, 5}).may_become) == ("open", ("for",))
+    assert str(first(0.009, {4, 5})).endswith("(open, not after Holm)")
+    assert first(0.009, set()).may_become == ()
+    assert first(0.02, {4, 5}).may_become == (), "times four, at best"
+    assert first(0.004, {4, 5}).state == "for"
 
 
 def test_the_outlook_in_words() -> None:
     def outlook(*statements: Statement, needed: int | None = None) -> str:
-        claim = replace(CLAIMS[0], needed=needed)
-        return Finding(claim, statements, 0, 0).outlook
+        return Finding(replace(FROM_CELLS[0], needed=needed), statements, 0, 0).outlook
 
     found, lost = (
         Statement("a", "for", estimate(1, 2), 0.01),
         Statement("b", "against", estimate(-2, -1), 0.01),
     )
     wide, absent = Statement("c", "open", estimate(-1, 1), 0.9), Statement("d", "missing")
-    by_holm, uncorrected = Statement("e", "open", estimate(1, 2), 0.2), Statement("f", "open", estimate(1, 2))
+    by_holm = Statement("e", "open", estimate(1, 2), 0.06, may_become=("for",))
     assert outlook(absent, absent) == outlook(found, absent) == ""
     assert outlook(found) == outlook(lost) == "", "decided"
     assert outlook(wide, absent) == "can no longer be supported"
     assert outlook(found, absent, absent, needed=2) == ""
     assert outlook(found, wide, absent, needed=2) == "can no longer be refuted"
     assert outlook(found, wide, wide, absent, needed=3) == "stays undecided"
-    assert outlook(wide, found) == outlook(uncorrected, found) == "stays undecided"
-    assert outlook(by_holm, found) == "", "a smaller factor may let the test find it"
+    assert outlook(wide, found) == "stays undecided"
+    assert outlook(by_holm, found) == "can no longer be refuted"
+    assert Finding(claims_named(["fisher-time"])[0], (wide,), 0, 0).outlook == "", "measured anew each time"
 
 
 def estimate(low: float, high: float) -> Estimate:
@@ -296,6 +337,7 @@ def test_a_whole_study_leaves_nothing_missing(made_up: Outcomes) -> None:
         assert found.finished == found.planned > 0, claim.id
         assert all(statement.state != "missing" for statement in found.statements), claim.id
         assert all(statement.estimate is not None for statement in found.statements)
+        assert found.verdict != "undecided" or found.outlook == "stays undecided", claim.id
         verdicts[claim.id] = found.verdict
     # What the made-up levels say: Beta above Gaussian by 250, logit-normal above Beta by 250, everywhere.
     assert (

@@ -8,6 +8,7 @@ interval. Everything else has an interval per statement, uncorrected, as the pro
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -97,9 +98,12 @@ def beats(
 
     def find(outcomes: Outcomes) -> list[Statement]:
         rows = _compared(outcomes, contrast, endpoint)
+        best = statistics.holm(
+            [0.0 if np.isnan(rows[robot].p_value) else rows[robot].p_value for robot in ROBOTS]
+        )
         return [
-            _of_comparison(_about(contrast, robot), rows[robot], -1 if robot in below else 1)
-            for robot in ROBOTS
+            _of_comparison(_about(contrast, robot), rows[robot], -1 if robot in below else 1, float(p))
+            for robot, p in zip(ROBOTS, best, strict=True)
             if robot in (*robots, *below)
         ]
 
@@ -121,13 +125,18 @@ def _compared(outcomes: Outcomes, contrast: Contrast, endpoint: str) -> dict[str
     return statistics.compare(first, second, rng, environments=ROBOTS, statistic="mean", missing="exclude")
 
 
-def _of_comparison(about: str, row: Comparison, sign: int) -> Statement:
+def _of_comparison(about: str, row: Comparison, sign: int, best: float) -> Statement:
+    """Read a row; `best` is its p after Holm, were the robots that are missing as clear as can be."""
     if row.difference is None:
         return Statement(about, "missing")
     said: Mapping[str, State] = (
         {"higher": "for", "lower": "against"} if sign > 0 else {"higher": "against", "lower": "for"}
     )
-    return Statement(about, said.get(verdict(row), "open"), row.difference, row.p_adjusted)
+    state = said.get(verdict(row), "open")
+    later = said.get(verdict(replace(row, p_adjusted=best)), "open")
+    return Statement(
+        about, state, row.difference, row.p_adjusted, may_become=() if later == state else (later,)
+    )
 
 
 def margin(outcomes: Outcomes, robot: str) -> float | None:
