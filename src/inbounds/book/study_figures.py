@@ -209,16 +209,17 @@ def _bars(
         for ax, given in zip(axes, cells.values(), strict=True):
             for place, (key, (estimate, remark_here)) in enumerate(given.items()):
                 _bar(ax, place, rows[key][1], estimate, remark_here)
-            if reference is not None:
-                ax.axvline(reference, color=_QUIET, linewidth=1.2, zorder=1)
+            if any(estimate for estimate, _ in given.values()):
+                if reference is not None:
+                    ax.axvline(reference, color=_QUIET, linewidth=1.2, zorder=1)
+            else:
+                without_scale(ax, "x")
             ax.set_ylim(len(rows) - 0.4, -0.75)
             ax.set_yticks(range(len(rows)), [label for label, _ in rows.values()])
             ax.tick_params(axis="y", length=0)
             ax.grid(visible=False, axis="y")
             ax.margins(x=0.12)
             ax.xaxis.set_major_locator(MaxNLocator(3))
-            if not any(estimate for estimate, _ in given.values()):
-                without_scale(ax, "x")
         # One label for all panels; below them it would lie on the note, which the layout engine places there.
         fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
         drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
@@ -232,6 +233,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
         ax.text(
             0.5, place, remark or "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
             style="italic", color=_QUIET, fontsize=SMALL,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )  # fmt: skip
         return
     value, low, high = (np.asarray(x) for x in (estimate.value, estimate.low, estimate.high))

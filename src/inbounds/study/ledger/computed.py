@@ -156,8 +156,8 @@ def loud_starts(robots: Sequence[str]) -> Evidence:
     def find(_: Outcomes) -> list[Statement]:
         found = []
         for robot in robots:
-            groups = [untrained(f, robot, std) for std in (LOUD, None) for f in ("logit-normal", "gaussian")]
-            found.append(half_left(robot, groups, ("loud", robot), claimed=True))
+            gaps = [[untrained(f, robot, std) for f in ("logit-normal", "gaussian")] for std in (LOUD, None)]
+            found.append(half_left(robot, *gaps, ("loud", robot), claimed=True))
         return found
 
     return find

@@ -26,24 +26,29 @@ def half_remains(
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
         for robot in robots:
-            groups = groups_of(outcomes, [(column, robot) for column in (*now, *before)], endpoint)
-            if groups is None:
-                found.append(Statement(robot, "missing"))
-            else:
-                name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
-                one_base = now[1] == before[1]
-                found.append(half_left(robot, groups, name, claimed=claimed, one_base=one_base))
+            gaps = [
+                groups_of(outcomes, [(column, robot) for column in pair], endpoint) for pair in (now, before)
+            ]
+            name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
+            found.append(half_left(robot, *gaps, name, claimed=claimed, one_base=now[1] == before[1]))
         return found
 
     return find
 
 
 def half_left(
-    about: str, groups: Sequence[Floats], name: Sequence[str], *, claimed: bool, one_base: bool = False
+    about: str,
+    now: Sequence[Floats] | None,
+    before: Sequence[Floats] | None,
+    name: Sequence[str],
+    *,
+    claimed: bool,
+    one_base: bool = False,
 ) -> Statement:
     """Say whether half of a gap is left: (a − b) − ½ (c − d) for the means of four groups.
 
-    For: above 0, or below where that is claimed. Moot: the gap c − d is not clearly above 0.
+    For: above 0, or below where that is claimed. Moot: the gap c − d is not clearly above 0, whatever a and b are; the
+    statement then tells the gap. Missing: it needs groups that are not there.
 
     Testing this linear form instead of the ratio (a − b)/(c − d) is Fieller's way: the ratio has no mean. A statement
     that is not moot has an overestimated gap c − d, on average, and so leans to "less than half". It is both clear and
@@ -51,12 +56,20 @@ def half_left(
 
     Args:
         about: of the statement.
-        groups: `[S]` each: a, b, c, d.
+        now: a and b, `[S]` each; None where they are missing.
+        before: c and d, likewise.
         name: of its generators.
         claimed: whether the claim is that so much is left.
         one_base: b and d are one group, whose seeds are drawn once.
     """
-    gap = combination(groups[2:], [1, -1], generator_for("ledger", *name, "gap"))
-    parts, weights = (groups[:3], [1, -0.5, -0.5]) if one_base else (groups, [1, -1, -0.5, 0.5])
+    if before is None:
+        return Statement(about, "missing")
+    gap = combination(before, [1, -1], generator_for("ledger", *name, "gap"))
+    if not gap.low > 0:
+        return Statement(f"{about} (gap)", "moot", gap)
+    if now is None:
+        return Statement(about, "missing")
+    (a, b), (c, d) = now, before
+    parts, weights = ([a, b, c], [1, -0.5, -0.5]) if one_base else ([a, b, c, d], [1, -1, -0.5, 0.5])
     rest = combination(parts, weights, generator_for("ledger", *name, "half"))
-    return Statement(about, side(rest, 1 if claimed else -1) if gap.low > 0 else "moot", rest)
+    return Statement(about, side(rest, 1 if claimed else -1), rest)
