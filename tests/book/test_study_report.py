@@ -190,6 +190,8 @@ def test_verdicts(low: float, value: float, high: float, p: float, said: str) ->
     [
         (lambda: number(-1234.5), "−1234"),
         (lambda: number(9.96), "10.0"),
+        (lambda: number(-0.04), "0.0"),  # no minus before a zero
+        (lambda: spoken(Estimate(*map(np.asarray, (-0.2, -1.0, 0.3)), 10, 0, 0.95, "mean"), 0), "0 [−1, 0]"),
         (lambda: p_value(0.00099), "< 0.001"),
         (lambda: p_value(0.0421), "0.042"),
         (lambda: spoken(None), "missing"),

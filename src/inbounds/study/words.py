@@ -19,13 +19,13 @@ def spoken(estimate: Estimate | None, digits: int | None = None) -> str:
     """
     if estimate is None:
         return "missing"
-    write: Callable[..., str] = number if digits is None else lambda x: _minus(f"{float(x):.{digits}f}")
+    write: Callable[..., str] = number if digits is None else lambda x: _minus(f"{float(x):z.{digits}f}")
     return f"{write(estimate.value)} [{write(estimate.low)}, {write(estimate.high)}]"
 
 
 def number(value: float | np.ndarray) -> str:
     """Say a return, with a decimal where it is small."""
-    return _minus(f"{float(value):.0f}" if abs(float(value)) >= 100 else f"{float(value):.1f}")
+    return _minus(f"{float(value):z.0f}" if abs(float(value)) >= 100 else f"{float(value):z.1f}")
 
 
 def p_value(p: float) -> str:
