@@ -104,6 +104,7 @@ STYLE: Mapping[str, Any] = MappingProxyType(
         "font.size": 13.0,
         "axes.titlesize": 13.0,
         "axes.labelsize": 13.0,
+        "figure.labelsize": 13.0,
         "xtick.labelsize": 12.0,
         "ytick.labelsize": 12.0,
         "legend.fontsize": 12.0,
