@@ -21,7 +21,7 @@ claims were added when three of the 136 cells were known: PPO on HalfCheetah, in
 TRPO × gaussian there, three things were mended, none of which has to do with these four: a loss counts as one that
 matters where its interval lies beyond the margin, not beyond 0; a group that is part of two gaps is drawn once; and the
 error of a sampled product must exceed a tenth, not 0. The outlook was added when twenty cells were finished, and a gap
-that is not clear was first told before its explanation was there when twenty-three were; both follow from the rule, and
+that is not clear was first told before its explanation was there when twenty-two were; both follow from the rule, and
 change no verdict.
 """
 
