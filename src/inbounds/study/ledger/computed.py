@@ -156,8 +156,11 @@ def loud_starts(robots: Sequence[str]) -> Evidence:
     def find(_: Outcomes) -> list[Statement]:
         found = []
         for robot in robots:
-            gaps = [[untrained(f, robot, std) for f in ("logit-normal", "gaussian")] for std in (LOUD, None)]
-            found.append(half_left(robot, *gaps, ("loud", robot), claimed=True))
+            loud, default = (
+                [untrained(family, robot, std) for family in ("logit-normal", "gaussian")]
+                for std in (LOUD, None)
+            )
+            found.append(half_left(robot, loud, default, ("loud", robot), claimed=True))
         return found
 
     return find

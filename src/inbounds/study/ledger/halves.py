@@ -26,11 +26,11 @@ def half_remains(
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
         for robot in robots:
-            gaps = [
+            left, gap = (
                 groups_of(outcomes, [(column, robot) for column in pair], endpoint) for pair in (now, before)
-            ]
+            )
             name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
-            found.append(half_left(robot, *gaps, name, claimed=claimed, one_base=now[1] == before[1]))
+            found.append(half_left(robot, left, gap, name, claimed=claimed, one_base=now[1] == before[1]))
         return found
 
     return find
