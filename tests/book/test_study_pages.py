@@ -1,5 +1,6 @@
 """The chapters' views of the study: the report's own parts, the same stored text with cells and without."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +8,11 @@ import pytest
 
 from inbounds.book import report_ledger, study_pages
 from inbounds.book.report_results import PUBLISHED, THESIS
+from inbounds.book.report_words import pair_name, spoken, verdict
 from inbounds.book.shown import Shown
 from inbounds.book.study_report import GROUPS, write_report
 from inbounds.study import analysis, select
-from inbounds.study.analysis import CONTRASTS
+from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import CLAIMS, claims_named, judge
 from inbounds.study.outcomes import Outcomes
@@ -49,6 +51,7 @@ def views(outcomes: Outcomes) -> list[Shown]:
         study_pages.ways(outcomes),
         *(study_pages.changes(outcomes, word) for word in GROUPS),
         study_pages.score_sheet(outcomes),
+        study_pages.found_differences(outcomes, "standard"),
         study_pages.published(outcomes),
         study_pages.ledger(found),
         study_pages.decided(found),
@@ -89,6 +92,19 @@ def test_the_score_sheet_counts_every_robot_once(some: Outcomes) -> None:
     assert first[:2] == ["PPO, standard practice", "Logit-normal − Gaussian"]
     assert first[2:7] == ["2", "0", "0", "0", "4"]  # 500 apart, noise 150: found on both robots
     assert first[7] == THESIS["ppo", "logit-normal", "gaussian"]
+
+
+def test_the_differences_found_are_those_that_the_score_sheet_counts(some: Outcomes) -> None:
+    rows = cells(study_pages.found_differences(some, "standard"))
+    assert {(robot, algorithm) for robot, algorithm, *_ in rows} <= {("Hopper", "PPO"), ("Ant", "PPO")}
+    by_pair = Counter(row[2] for row in rows if "\nhigher, p " in row[3] or "\nlower, p " in row[3])
+    counted = {row[1]: int(row[2]) + int(row[3]) for row in cells(study_pages.score_sheet(some))[:3]}
+    assert {pair: by_pair[pair] for pair in counted} == counted
+    contrast = Contrast("standard", "ppo", "logit-normal", "gaussian")
+    (row,) = [row for row in rows if row[0] == "Hopper" and row[2] == pair_name(contrast)]
+    for text, endpoint in zip(row[3:], analysis.ENDPOINTS, strict=True):
+        expected = analysis.differences(some, contrast, endpoint)["Hopper"]
+        assert text.startswith(f"{spoken(expected.difference)}\n{verdict(expected)}, p ")
 
 
 def test_published_scores_stand_beside_ours(some: Outcomes) -> None:

@@ -1,4 +1,4 @@
-"""Two tables on the thesis's results: wins and losses by the protocol, and scores that others have published."""
+"""Tables on the thesis's results: wins and losses by the protocol, what is found, and scores that others published."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from collections import Counter
 from collections.abc import Mapping
 
 from inbounds.book import report_page as html
+from inbounds.book.report_aggregates import HEADS
 from inbounds.book.report_arms import title_of
-from inbounds.book.report_words import pair_name, spoken, verdict
+from inbounds.book.report_words import p_value, pair_name, spoken, verdict
 from inbounds.study import analysis
-from inbounds.study.analysis import CONTRASTS
+from inbounds.study.analysis import CONTRASTS, ENDPOINTS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.statistics import Comparison
+from inbounds.study.statistics.settings import LEVEL
 
 THESIS: Mapping[tuple[str, str, str], str] = {
     ("ppo", "logit-normal", "gaussian"): "ahead on 2, little difference on 3, behind on 1",
@@ -47,6 +50,35 @@ def score_sheet(outcomes: Outcomes) -> list[str]:
         "unresolved: the interval contains 0."
     )
     return [html.table(caption, ["columns", "difference", *_WORDS, "the source thesis"], rows, (0, 1, 7))]
+
+
+def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
+    """Return, robot by robot, every difference of an arm that some endpoint finds, with what the others say of it."""
+    tested = {
+        contrast: [analysis.differences(outcomes, contrast, endpoint) for endpoint in ENDPOINTS]
+        for contrast in CONTRASTS
+        if contrast.arm == arm
+    }
+    rows = []
+    for robot in ROBOTS:
+        for contrast, by_endpoint in tested.items():
+            comparisons = [by_robot[robot] for by_robot in by_endpoint]
+            if any(verdict(each) in ("higher", "lower") for each in comparisons):
+                names = [robot, contrast.algorithm.upper(), pair_name(contrast)]
+                rows.append([*names, *map(_tested, comparisons)])
+    if not rows:
+        return [html.paragraph("No difference is found among the finished cells.", "missing")]
+    caption = (
+        "Differences of means that are found by at least one endpoint: the interval leaves out 0, and so does the "
+        f"permutation test after Holm's correction over {len(ROBOTS)} robots, whose p is given. In brackets a "
+        f"{LEVEL:.0%} bootstrap interval. Final return and area are primary endpoints, the greedy return is secondary."
+    )
+    return [html.table(caption, ["robot", "algorithm", "difference", *HEADS.values()], rows, range(6))]
+
+
+def _tested(comparison: Comparison) -> str:
+    p = p_value(comparison.p_adjusted)
+    return f"{spoken(comparison.difference)}\n{verdict(comparison)}, p {p if '<' in p else f'= {p}'}"
 
 
 PUBLISHED: Mapping[str, Mapping[str, tuple[str, str]]] = {

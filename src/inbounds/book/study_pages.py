@@ -108,6 +108,12 @@ def score_sheet(outcomes: Outcomes) -> Shown:
     return _shown("study: wins and losses", report_results.score_sheet(outcomes))
 
 
+def found_differences(outcomes: Outcomes, arm: str) -> Shown:
+    """Return every difference of an arm that some endpoint finds, with all endpoints."""
+    title = report_arms.TITLES[arm].partition(": ")[2]
+    return _shown(f"study: what is found, {title}", report_results.found_differences(outcomes, arm))
+
+
 def published(outcomes: Outcomes) -> Shown:
     """Return published scores beside the study's."""
     return _shown("study: beside published scores", report_results.published(outcomes))
