@@ -386,8 +386,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "another configuration goes on with the run",
         "cli/training.py",
-        "if before.get(name) != now.get(name) and name not in FREE_TO_CHANGE",
-        "if before.get(name) is now and name not in FREE_TO_CHANGE",
+        'if changes := _changes(config, state["config"]):',
+        'if changes := "":',
         "tests/cli/test_train.py::test_another_configuration_is_refused",
     ),
     Mutant(
@@ -434,9 +434,9 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "an option that came later makes another study",
-        "study/configuration.py",
-        "theirs.get(name, defaults.get(name, _NO_DEFAULT))",
-        "theirs.get(name, _NO_DEFAULT)",
+        "learning/stored_config.py",
+        "(theirs.get(name, defaults.get(name, _NO_DEFAULT)), ours",
+        "(theirs.get(name, _NO_DEFAULT), ours",
         "tests/study/test_grid.py::test_an_option_that_came_later_had_its_default",
     ),
     Mutant(

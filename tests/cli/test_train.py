@@ -165,6 +165,9 @@ def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) ->
     succeeds(small(tmp_path / "run", 4))
     succeeds(small(tmp_path / "whole", 4))
     assert same_rows(read_curves(tmp_path / "run"), read_curves(tmp_path / "whole"))
+    prolonged = contents(tmp_path / "run")
+    assert "there was nothing to do: 4 epochs are done" in succeeds(small(tmp_path / "run", 2))
+    assert contents(tmp_path / "run") == prolonged
 
 
 # ---- what could be lost

@@ -127,6 +127,18 @@ def test_a_readers_own_gymnasium_environment() -> None:
             ),
             "one-dimensional Box",
         ),
+        (
+            lambda n: SyncVectorEnv(
+                [
+                    lambda: gymnasium.wrappers.TransformObservation(
+                        gymnasium.make("Pendulum-v1"), lambda obs: 3, gymnasium.spaces.Discrete(5)
+                    )
+                ]
+                * n,
+                autoreset_mode=AutoresetMode.SAME_STEP,
+            ),
+            "observations must be a Box, got Discrete.*FlattenObservation",
+        ),
     ],
 )
 def test_environments_that_cannot_work_are_refused_with_the_fix(make, message: str) -> None:

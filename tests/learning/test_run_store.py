@@ -149,6 +149,8 @@ def test_what_is_asked_of_a_policy_wrongly(tmp_path: Path) -> None:
     policy = load_policy(tmp_path)
     with pytest.raises(ValueError, match=r"shape \[3\] or \[B, 3\], got \[4\]"):
         policy.act(np.zeros(4))
+    with pytest.raises(ValueError, match=r"NaN or infinite.*look at the sensor"):
+        policy.act(np.array([[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]]))
     with pytest.raises(ValueError, match="choose one of mean, median, mode, sample"):
         policy.act(np.zeros(3), "best")
     with pytest.raises(IndexError, match="a seed index from 0 to 2"):

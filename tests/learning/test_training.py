@@ -37,7 +37,7 @@ def same_records(a: list[dict], b: list[dict], rows: slice | list[int] = slice(N
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_poisoned_seed_harms_no_other(algo: str, family: str) -> None:
     healthy = small_run(small_config(algo, family))
-    with pytest.warns(DivergedSeedWarning, match=r"seeds \[1\] diverged in epoch 0"):
+    with pytest.warns(DivergedSeedWarning, match=r"seeds \[1\] diverged in epoch 0.*mend the environment"):
         poisoned = small_run(small_config(algo, family), poisoned=(1,))
     assert torch.equal(weights(healthy)[[0, 2]], weights(poisoned)[[0, 2]])
     assert same_records(healthy.records, poisoned.records, [0, 2])
@@ -117,6 +117,22 @@ def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:
     whole = train(config, make_envs=forgetful)
     assert same_records(whole.records[:2], resumed.records[:2])
     assert not torch.equal(weights(whole), weights(resumed))
+
+
+def test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics() -> None:
+    def forgetful(n: int) -> PointEnv:
+        return PointEnv(n, saves=False)
+
+    run = small_run(small_config(epochs=2), saves=False)
+    resumed = Trainer(run.config, forgetful)
+    resumed.load_state_dict(run.state_dict())
+    collector = resumed.collector
+    first, _ = forgetful(3).reset(seed=[stream.environment for stream in collector.streams])
+    assert collector.normalizer.count == run.collector.normalizer.count + 1
+    assert np.array_equal(collector.obs, collector.normalizer(first))
+    assert (
+        np.abs(collector.obs).max() > 0.1
+    )  # fresh statistics would have seen nothing but these: all would be 0
 
 
 KILLED = """
@@ -238,7 +254,7 @@ def test_an_exploding_seed_is_marked_when_it_explodes() -> None:
     trainer = Trainer(small_config(), PointEnv)
     trainer.epoch()
     trainer.networks.critic.theta[2, 5] = torch.inf
-    with pytest.warns(DivergedSeedWarning, match=r"\[2\] diverged in epoch 1"):
+    with pytest.warns(DivergedSeedWarning, match=r"\[2\] diverged in epoch 1.*smaller learning_rate"):
         trainer.epoch()
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from inbounds.learning import preset
-from inbounds.learning.training import describe
-from inbounds.study import configuration
+from inbounds.learning import preset, stored_config
+from inbounds.learning.stored_config import describe
 from inbounds.study.grid import ARMS, ROBOTS, VARIANTS, Cell, select, study_cells
 from inbounds.study.statistics import settings
 
@@ -82,15 +81,15 @@ def test_every_cell_has_the_full_length() -> None:
 def test_an_option_that_came_later_had_its_default() -> None:
     config = Cell("test", "ppo", "beta", "Hopper").config
     stored = json.loads(json.dumps(describe(config)))
-    assert configuration.differences(config, stored) == []
+    assert stored_config.differences(config, stored) == {}
     del stored["normalize_obs"], stored["algorithm"]["gamma"], stored["policy"]["limits"]
     later = dataclasses.replace(config, algorithm=dataclasses.replace(config.algorithm, gamma=0.9))
-    assert configuration.differences(config, stored) == []
+    assert stored_config.differences(config, stored) == {}
     later = dataclasses.replace(later, normalize_obs=False)
-    assert configuration.differences(later, stored) == ["algorithm.gamma", "normalize_obs"]
-    assert configuration.differences(config, stored | {"env": "Ant-v5", "new": 1})[0] == "env"
-    assert "new" in configuration.differences(config, stored | {"new": 1})
-    assert "epochs" in configuration.differences(dataclasses.replace(config, epochs=9), stored)
+    assert list(stored_config.differences(later, stored)) == ["algorithm.gamma", "normalize_obs"]
+    assert stored_config.differences(config, stored | {"env": "Ant-v5"}) == {"env": ("Ant-v5", "Hopper-v5")}
+    assert stored_config.differences(config, stored | {"new": 1}) == {"new": (1, "absent")}
+    assert "epochs" in stored_config.differences(dataclasses.replace(config, epochs=9), stored)
 
 
 def test_printed_cells_are_the_preset() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import difflib
 import os
 import signal
@@ -21,10 +22,9 @@ from inbounds.learning import TrainConfig, Trainer, checkpoint, train
 from inbounds.learning.files import DamagedFileError, is_disk_full
 from inbounds.learning.rollout import check_environments
 from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
-from inbounds.learning.training import Record, describe, make_environments
+from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
+from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
-
-FREE_TO_CHANGE = ("--epochs", "--checkpoint-every")
 
 
 class Stop:
@@ -70,9 +70,11 @@ class _Session:
     """One process' part of a run: what it does after every epoch, and what it says when it ends."""
 
     def __init__(self, command: Train, config: TrainConfig, run_dir: Path) -> None:
-        self.config, self.run_dir, self.stop = config, run_dir, Stop()
-        self.wants_tensorboard = command.tensorboard
         self.done = self.kept = _epochs_kept(run_dir, config)
+        # A run that has more epochs than are asked for keeps them, and goes on saying so.
+        self.config = dataclasses.replace(config, epochs=max(config.epochs, self.done))
+        self.run_dir, self.stop = run_dir, Stop()
+        self.wants_tensorboard = command.tensorboard
 
     def run(self) -> int:
         """Train to the end, or say how far it came and what is kept."""
@@ -187,7 +189,7 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
         state = load_checkpoint(run_dir)
     except DamagedFileError as error:
         raise CommandError(str(error)) from error
-    if changes := _differences(state["config"], describe(config)):
+    if changes := _changes(config, state["config"]):
         raise CommandError(
             f"{run_dir} is the run of another configuration ({changes}): choose another --out, or ask for that one",
             2,
@@ -195,25 +197,14 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
     return len(state["records"])
 
 
-def _differences(theirs: dict[str, Any], ours: dict[str, Any]) -> str:
+def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
     """What a `Trainer` would refuse to change in mid-run, as the command line spells it."""
-    if theirs["algorithm_name"] != ours["algorithm_name"]:
-        return f"--algo {theirs['algorithm_name']} there, {ours['algorithm_name']} here"
-    before, now = _flat(theirs), _flat(ours)
+    different = differences(config, stored, FREE_TO_CHANGE)
+    if "algorithm_name" in different:  # another algorithm has other options, too
+        different = {"algo": different["algorithm_name"]}
     return "; ".join(
-        f"{name} {before.get(name, 'absent')} there, {now.get(name, 'absent')} here"
-        for name in sorted(before | now)
-        if before.get(name) != now.get(name) and name not in FREE_TO_CHANGE
+        f"--{name.replace('_', '-')} {there} there, {here} here" for name, (there, here) in different.items()
     )
-
-
-def _flat(values: dict[str, Any], prefix: str = "--") -> dict[str, Any]:
-    """Nested values by the names of their options."""
-    flat: dict[str, Any] = {}
-    for key, value in values.items():
-        name = prefix + key.replace("_", "-")
-        flat |= _flat(value, f"{name}.") if isinstance(value, dict) else {name: value}
-    return flat
 
 
 @contextlib.contextmanager

@@ -232,11 +232,11 @@ class Collector:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go back to a state. Environments without `set_state` start new episodes instead."""
         restore_generators([stream.noise for stream in self.streams], state["noise"])
-        if state["envs"] is None:
-            self.restart()
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
-        if state["envs"] is not None:
+        if state["envs"] is None:
+            self.restart()  # its first observations are seen with the statistics that have just been loaded
+        else:
             unwrapped: Any = self.envs.unwrapped
             unwrapped.set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
@@ -250,7 +250,8 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         num_seeds: how many there must be.
 
     Raises:
-        ValueError: another number, another autoreset mode, or actions that are no bounded one-dimensional Box.
+        ValueError: another number, another autoreset mode, observations that are no Box, or actions that are no
+            bounded one-dimensional one.
     """
     if envs.num_envs != num_seeds:
         raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
@@ -259,6 +260,11 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         raise ValueError(
             f"the environments reset in the mode {mode}, which puts dummy transitions into the data: make them with "
             "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP"
+        )
+    if not isinstance(envs.single_observation_space, gymnasium.spaces.Box):
+        raise ValueError(
+            f"observations must be a Box, got {envs.single_observation_space}: wrap the environment "
+            "(gymnasium.wrappers.FlattenObservation) so that they are"
         )
     box = envs.single_action_space
     if not isinstance(box, gymnasium.spaces.Box) or len(box.shape) != 1 or not box.is_bounded():

@@ -12,7 +12,7 @@ from inbounds.learning.actor_critic import NetworkConfig
 from inbounds.learning.config import ALGORITHMS, TrainConfig
 from inbounds.learning.laws import Limits
 from inbounds.learning.policies import PolicyConfig
-from inbounds.learning.training import describe
+from inbounds.learning.stored_config import describe
 
 METADATA_KEY = "inbounds"
 FORMAT = 1

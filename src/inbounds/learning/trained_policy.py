@@ -100,13 +100,19 @@ class TrainedPolicy:
             `[A]` or `[B, A]`, in the robot's units, within the box (a sample under `action_mode="raw"` may leave it).
 
         Raises:
-            ValueError: observations of another size, or a greedy action that the family does not offer.
+            ValueError: observations of another size or not finite, or a greedy action that the family
+                does not offer.
         """
         obs = np.asarray(obs)
         if obs.ndim not in (1, 2) or obs.shape[-1] != self._network.sizes[0]:
             raise ValueError(
                 f"observations must have the shape [{self._network.sizes[0]}] or [B, {self._network.sizes[0]}], "
                 f"got {list(obs.shape)}"
+            )
+        if not np.isfinite(obs).all():
+            raise ValueError(
+                "an observation is NaN or infinite, and there is no action for that: look at the sensor, or at the "
+                "environment, that it came from"
             )
         batch = np.atleast_2d(obs)  # [B, O]
         seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)

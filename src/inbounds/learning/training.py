@@ -15,7 +15,6 @@ long run in chaotic physics amplifies. The number of threads does not matter: tr
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -33,6 +32,7 @@ from inbounds.learning.config import ALGORITHMS, TrainConfig
 from inbounds.learning.policies import Policy
 from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
+from inbounds.learning.stored_config import FREE_TO_CHANGE, describe, differences
 from inbounds.robots.registration import TASK_NAMES
 from inbounds.robots.registration import make as make_robots
 
@@ -54,6 +54,10 @@ class Trainer:
     Args:
         config: what to do.
         make_envs: makes the vector environment for a number of seeds; None makes `config.env`.
+
+    Raises:
+        ValueError: the environments are not ones that a `Collector` can act in, their bounds are not finite and in
+            order, or no parameters give the `initial_std` that the policy asks for.
 
     Example:
         >>> from inbounds.learning.config import preset
@@ -92,7 +96,7 @@ class Trainer:
             rollout = self.collector.collect(algorithm.horizon)
             shuffles = [stream.shuffle for stream in self.streams]
             diagnostics = self._algorithm.update(self.networks, self.optimizer, rollout, shuffles, algorithm)
-        self._mark_diverged()
+        self._mark_diverged(rollout)
         record: Record = {
             "epoch": len(self.records),
             "env_steps": algorithm.horizon * (len(self.records) + 1),
@@ -106,17 +110,26 @@ class Trainer:
         self.records.append(record)
         return record
 
-    def _mark_diverged(self) -> None:
-        """Mark, and warn of, the seeds whose weights have just ceased to be finite."""
+    def _mark_diverged(self, rollout: Rollout) -> None:
+        """Mark, and warn of, the seeds whose weights have just ceased to be finite; say where that came from."""
         now = ~self.networks.finite().numpy()
-        if (new := now & ~self.diverged).any():
-            seeds = [seed for seed, is_new in zip(self.config.seeds, new, strict=True) if is_new]
-            warnings.warn(
-                f"seeds {seeds} diverged in epoch {len(self.records)}: their weights are not finite. They are marked "
-                "in every later record; leave them out of means, or train with a smaller learning_rate",
-                DivergedSeedWarning,
-                stacklevel=3,
-            )
+        received = (rollout.obs.isfinite().all(2) & rollout.reward.isfinite()).all(1).numpy()
+        for new, advice in (
+            (now & ~self.diverged & received, "train with a smaller learning_rate"),
+            (
+                now & ~self.diverged & ~received,
+                "mend the environment, which has returned an observation or a reward that is no finite number "
+                "(inbounds.book.environment_checks looks for more)",
+            ),
+        ):
+            if new.any():
+                seeds = [seed for seed, is_new in zip(self.config.seeds, new, strict=True) if is_new]
+                warnings.warn(
+                    f"seeds {seeds} diverged in epoch {len(self.records)}: their weights are not finite. They are "
+                    f"marked in every later record; leave them out of means, or {advice}",
+                    DivergedSeedWarning,
+                    stacklevel=3,
+                )
         self.diverged |= now
 
     @property
@@ -149,10 +162,8 @@ class Trainer:
         Raises:
             ValueError: another configuration wrote it; more epochs than planned then are allowed.
         """
-        ours, theirs = describe(self.config), state["config"]
-        different = [key for key in ours if ours[key] != theirs.get(key) and key not in FREE_TO_CHANGE]
-        if different:
-            changes = "; ".join(f"{key}: {theirs.get(key)} → {ours[key]}" for key in different)
+        if different := differences(self.config, state["config"], FREE_TO_CHANGE):
+            changes = "; ".join(f"{name}: {stored} → {ours}" for name, (stored, ours) in different.items())
             raise ValueError(
                 f"the checkpoint belongs to another configuration ({changes}): "
                 "use that one, or another run directory"
@@ -163,10 +174,6 @@ class Trainer:
         restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
         self.records = list(state["records"])
         self.diverged = state["diverged"].copy()
-
-
-FREE_TO_CHANGE = ("epochs", "checkpoint_every")
-"""What a run may be continued with that it was not begun with."""
 
 
 def train(
@@ -236,11 +243,6 @@ def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
         "episodes": np.array([len(r) for r in returns]),
         "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
     }
-
-
-def describe(config: TrainConfig) -> dict[str, Any]:
-    """Return a configuration as nested plain dictionaries, the algorithm's name included."""
-    return {**dataclasses.asdict(config), "algorithm_name": config.algorithm_name}
 
 
 @contextlib.contextmanager

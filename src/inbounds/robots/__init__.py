@@ -4,6 +4,7 @@ Names are imported on first use, because ``import inbounds`` passes through this
 backend (:mod:`inbounds.robots.headless`), and that has to happen before ``mujoco`` is imported.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +31,15 @@ __all__ = ["TASKS", "Camera", "Film", "MujocoWarning", "RobotRenderer", "RobotVe
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    try:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    except (
+        AttributeError
+    ) as error:  # what PyOpenGL raises in `import mujoco`; Python would report a missing name
+        raise ImportError(
+            f"MuJoCo cannot be imported with MUJOCO_GL={os.environ.get('MUJOCO_GL')} ({error}): unset it and start "
+            "Python again, or install the library that it names"
+        ) from error
     globals()[name] = value  # found directly from now on
     return value
 

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from inbounds.learning import TrainConfig
 from inbounds.learning.files import DamagedFileError, write_whole
 from inbounds.learning.run_files import METADATA_KEY, metadata_of
+from inbounds.learning.stored_config import differences
 from inbounds.study.claim import file_lock
-from inbounds.study.configuration import differences
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 
 CHECKSUMS_FILE = "checksums.txt"

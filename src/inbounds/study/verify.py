@@ -18,8 +18,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from inbounds.learning.files import DamagedFileError
+from inbounds.learning.stored_config import differences
 from inbounds.study import store
-from inbounds.study.configuration import differences
 from inbounds.study.grid import Cell
 from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.provenance import provenance

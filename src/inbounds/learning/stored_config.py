@@ -7,44 +7,56 @@ else results change and a new study version is due; so an option that is not nam
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any
 
-from inbounds.learning import TrainConfig
+from inbounds.learning.config import TrainConfig
+
+FREE_TO_CHANGE = ("epochs", "checkpoint_every")
+"""What a run may be continued with that it was not begun with."""
 
 _NO_DEFAULT = object()
 
 
+def describe(config: TrainConfig) -> dict[str, Any]:
+    """Return a configuration as nested plain dictionaries, the algorithm's name included."""
+    return {**dataclasses.asdict(config), "algorithm_name": config.algorithm_name}
+
+
 def differences(
-    config: TrainConfig, stored: Mapping[str, Any], free: Sequence[str] = ("checkpoint_every",)
-) -> list[str]:
+    config: TrainConfig, stored: Mapping[str, Any], free: Collection[str] = ("checkpoint_every",)
+) -> dict[str, tuple[Any, Any]]:
     """Return the options in which a stored configuration differs from one of today.
 
     Args:
         config: of today.
-        stored: `inbounds.learning.training.describe` of another time, perhaps by way of JSON.
+        stored: `describe` of another time, perhaps by way of JSON.
         free: options that decide no result.
 
     Returns:
-        Their names, dotted: "algorithm.gamma".
+        By their dotted names, as "algorithm.gamma", what is stored and what is asked for; "absent" where one side
+        does not know the option.
 
     Example:
         >>> from inbounds.learning import preset
-        >>> from inbounds.learning.training import describe
         >>> config = preset("common", "Hopper-v5")
         >>> stored = describe(config) | {"normalize_obs": False}
         >>> differences(config, stored)
-        ['normalize_obs']
+        {'normalize_obs': (False, True)}
     """
     ours = {name: value for name, (value, _) in _options(config).items()}
     defaults = {name: default for name, (_, default) in _options(config).items()}
     theirs = _leaves(stored)
-    names = [name for name in dict.fromkeys([*ours, *theirs]) if name not in free]
-    return [
-        name
-        for name in names
-        if ours.get(name, _NO_DEFAULT) != theirs.get(name, defaults.get(name, _NO_DEFAULT))
-    ]
+    pairs = {
+        name: (theirs.get(name, defaults.get(name, _NO_DEFAULT)), ours.get(name, _NO_DEFAULT))
+        for name in dict.fromkeys([*ours, *theirs])
+        if name not in free
+    }
+    return {
+        name: ("absent" if there is _NO_DEFAULT else there, "absent" if here is _NO_DEFAULT else here)
+        for name, (there, here) in pairs.items()
+        if there != here
+    }
 
 
 def _options(config: TrainConfig) -> dict[str, tuple[Any, Any]]:
