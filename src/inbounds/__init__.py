@@ -2,7 +2,8 @@
 
 Five rooms, in the order in which an action lives: it is drawn (:mod:`inbounds.distributions`), executed
 (:mod:`inbounds.robots`), learned from (:mod:`inbounds.learning`), studied (:mod:`inbounds.study`) and shown
-(:mod:`inbounds.book`).
+(:mod:`inbounds.book`). Two doors: to other libraries (:mod:`inbounds.integrations`), and to the command line
+(:mod:`inbounds.cli`).
 
 Importing the package is light: no Jupyter, Bokeh or mediapy. On Linux without a display it also chooses
 MuJoCo's off-screen backend, which has to happen before ``mujoco`` is imported for the first time.

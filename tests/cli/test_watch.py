@@ -59,13 +59,21 @@ def test_by_default_the_median_of_the_first_seed_in_the_run_directory(runs: Path
     assert "Swimmer-v5, beta, seed 0, acting by" in out
 
 
+def test_what_has_no_simulation_is_trained_and_not_filmed(tmp_path: Path) -> None:
+    out = succeeds(small(tmp_path / "car", 1, "MountainCarContinuous-v0"))
+    assert "film it" not in out
+    code, _, err = run("watch", tmp_path / "car", "--seconds", "0.1")
+    assert code == 1
+    assert "gives no access to a MuJoCo simulation" in err
+
+
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
         ("nowhere", 1, "choose one of {runs}/beta, {runs}/hopper"),
         ("hopper --seed-index 2", 2, "the run has 2 seeds, 0 to 1"),
         ("hopper --seconds 0", 2, "must be positive"),
-        ("hopper --width 63 --seconds 0.1", 1, "must be even"),
+        ("hopper --width 63 --seconds 0.1", 2, "must be even"),
         ("hopper --out no/such/folder/film.mp4", 1, "mkdir -p no/such/folder"),
     ],
 )

@@ -142,3 +142,6 @@ def test_the_half_width_is_the_callers_too() -> None:
 def test_impossible_rules_are_refused(rule, arguments: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="rule needs"):
         rule(*arguments)
+    for number in ({"num_nodes": 1}, {"num_nodes": 0}, {"half_width": 0.0}):
+        with pytest.raises(ValueError, match="trapezoid rule needs"):
+            graded_trapezoid(*double(0.0, 1.0), **number)

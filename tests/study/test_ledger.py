@@ -521,7 +521,7 @@ def test_the_command_prints_the_statements(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_an_unknown_claim_is_a_clear_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert study(["ledger", "nonsense", "--results", "no/results"]) == 2
+    assert study(["ledger", "nonsense", "--results", str(SHIPPED.results)]) == 2
     assert "there are start-printed" in capsys.readouterr().err
 
 

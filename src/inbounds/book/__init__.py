@@ -1,4 +1,5 @@
 """What the chapters show: figures, videos, explorables and graders.
 
-Everything here needs the ``book`` extra (``pip install "inbounds[book]"``), and nothing else in the package imports it.
+Everything here needs the ``book`` extra (``pip install ".[book]"`` in the source tree). Of the rest of the package
+only :mod:`inbounds.cli` imports it.
 """

@@ -169,13 +169,25 @@ def _poster(frame: NDArray[np.uint8]) -> bytes:
     return data
 
 
+def require_encoder() -> None:
+    """Raise unless films can be encoded.
+
+    Raises:
+        RuntimeError: mediapy or ffmpeg is missing; the message names the fix.
+
+    Example:
+        >>> require_encoder()
+    """
+    _mediapy()
+
+
 def _mediapy() -> Any:
     """The library mediapy, told to use the ffmpeg that imageio-ffmpeg brings."""
     try:
         import imageio_ffmpeg
         import mediapy
     except ImportError as error:
-        raise RuntimeError(f"Videos need {error.name}: pip install 'inbounds[book]'") from error
+        raise RuntimeError(f"Videos need {error.name}: pip install '.[book]' in the source tree") from error
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError as error:

@@ -135,14 +135,18 @@ def study(args: Sequence[str]) -> int:
     read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
     kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
     description = "The study of the book: all algorithms, families and robots, ten seeds each."
-    command: StudyCommand = read(
-        Union[kinds],  # noqa: UP007
-        args=list(args) or ["--help"],
-        prog="inbounds study",
-        description=description,
-    )
     console = Console(highlight=False, force_jupyter=False)
     try:
+        command: StudyCommand = read(
+            Union[kinds],  # noqa: UP007
+            args=list(args) or ["--help"],
+            prog="inbounds study",
+            description=description,
+        )
+        if not isinstance(command, Run | Status) and not command.results.is_dir():
+            raise ValueError(
+                f"no folder {command.results} here: go to the source tree, or name it with --results"
+            )
         if isinstance(command, Ledger):
             return _ledger(command, console)
         cells = command.chosen()
@@ -177,6 +181,11 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
             console.print(f"{cell.id}: {cell_status(cell, command.folder())}", markup=False, soft_wrap=True)
     else:
         console.print(status_table(cells, command.folder()))
+        if not command.results.is_dir():
+            console.print(
+                f"no folder {command.results} here: go to the source tree, or name it with --results",
+                markup=False,
+            )
     return 0
 
 
@@ -185,7 +194,7 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         from inbounds.book.study_report import write_report
     except ImportError as error:
         raise StudyError(
-            f"the report draws with Matplotlib ({error}): pip install 'inbounds[book]'"
+            f"the report draws with Matplotlib ({error}): pip install '.[book]' in the source tree"
         ) from error
     outcomes = Outcomes.read(command.folder(), cells)
     try:

@@ -31,9 +31,7 @@ class TensorBoardWriter:
         try:
             from torch.utils.tensorboard import SummaryWriter
         except ImportError as error:
-            raise CommandError(
-                "--tensorboard needs TensorBoard: pip install 'inbounds[tensorboard]' (or pip install tensorboard)"
-            ) from error
+            raise CommandError("--tensorboard needs TensorBoard: pip install tensorboard") from error
         make: Any = SummaryWriter
         self._writers = [make(str(directory / f"seed-{seed}"), purge_step=0) for seed in seeds]
         self._written = 0

@@ -25,6 +25,7 @@ from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_F
 from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
 from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
+from inbounds.robots.rendering import is_drawable
 
 
 class Stop:
@@ -138,7 +139,8 @@ class _Session:
             else f"there was nothing to do: {start} epochs are done"
         )
         print(f"{done}. {self.run_dir} has {CURVES_FILE}, {POLICIES_FILE} and {CHECKPOINT_FILE}")
-        print(f"film it: inbounds watch {self.run_dir}")
+        if is_drawable(trainer.envs):
+            print(f"film it: inbounds watch {self.run_dir}")
         return 0
 
     def _kept(self, what: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from numpy.typing import NDArray
 
-from inbounds.book.videos import write_film
+from inbounds.book.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Watch
 from inbounds.learning.files import DamagedFileError, is_disk_full
@@ -33,6 +33,8 @@ def run(command: Watch) -> int:
     )
     if command.seconds <= 0 or min(command.width, command.height) < 2:
         raise CommandError("--seconds, --width and --height must be positive", 2)
+    if command.width % 2 or command.height % 2:
+        raise CommandError("--width and --height must be even: the film's colours come in squares of four", 2)
     if not path.parent.is_dir():
         raise CommandError(f"there is no folder {path.parent}: make it first (mkdir -p {path.parent})")
     rng = np.random.default_rng(command.env_seed)
@@ -41,6 +43,7 @@ def run(command: Watch) -> int:
         return policy.act(obs.reshape(1, -1), greedy, rng)
 
     try:
+        require_encoder()  # before the film is made, not after
         envs = RecordEpisodeStatistics(make_environments(policy.config, 1))
         film = record(
             envs,

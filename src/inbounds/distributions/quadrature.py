@@ -96,15 +96,19 @@ def trapezoid(
         >>> rule.nodes.tolist()
         [-4.0, -2.0, 0.0, 2.0, 4.0]
     """
-    if num_nodes < 2 or not half_width > 0:
-        raise ValueError(
-            f"the trapezoid rule needs num_nodes >= 2 and half_width > 0, got {num_nodes} and {half_width}"
-        )
+    _check_trapezoid(num_nodes, half_width)
     nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype, device=device)
     step = 2 * half_width / (num_nodes - 1)
     weights = step * standard_normal_pdf(nodes)
     weights[[0, -1]] /= 2
     return Rule(nodes, weights)
+
+
+def _check_trapezoid(num_nodes: int, half_width: float) -> None:
+    if num_nodes < 2 or not half_width > 0:
+        raise ValueError(
+            f"the trapezoid rule needs num_nodes >= 2 and half_width > 0, got {num_nodes} and {half_width}"
+        )
 
 
 def gauss_hermite(
@@ -161,6 +165,9 @@ def graded_trapezoid(
     Returns:
         A rule with `[..., N]` nodes and weights, constant to autograd.
 
+    Raises:
+        ValueError: fewer than two nodes, or a half-width that is not positive.
+
     Example:
         >>> import torch
         >>> loc, scale = torch.tensor(1.0).double(), torch.tensor(1000.0).double()
@@ -169,8 +176,11 @@ def graded_trapezoid(
         0.500399
     """
     double = torch.promote_types(loc.dtype, scale.dtype) == torch.float64
-    num_nodes = num_nodes or (128 if double else 48)
-    half_width = half_width or (10.0 if double else 7.0)
+    if num_nodes is None:
+        num_nodes = 128 if double else 48
+    if half_width is None:
+        half_width = 10.0 if double else 7.0
+    _check_trapezoid(num_nodes, half_width)
     loc, scale = loc.detach().unsqueeze(-1), scale.detach().unsqueeze(-1)
     centre = (-loc / scale).clamp(-half_width, half_width)
     rate = scale / (2 * math.pi)

@@ -171,7 +171,7 @@ class ScaledBeta(SigmoidMapped):
         """Return the differential entropy `[...]` in nats, the interval's length included."""
         alpha, beta = self._concentrations()
         unit_entropy = (
-            _log_beta(alpha, beta)
+            log_beta(alpha, beta)
             - (alpha - 1) * torch.digamma(alpha)
             - (beta - 1) * torch.digamma(beta)
             + (alpha + beta - 2) * torch.digamma(alpha + beta)
@@ -224,11 +224,11 @@ class ScaledBeta(SigmoidMapped):
         """Return the log-density over values in float64 from log x and log(1 − x)."""
         alpha, beta = self._concentrations()
         shape = (alpha - 1) * log_fraction + (beta - 1) * log_complement
-        return shape - _log_beta(alpha, beta) - self.width.double().log()
+        return shape - log_beta(alpha, beta) - self.width.double().log()
 
 
-def _log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
-    """Return log B(α, β)."""
+def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
+    """Return log B(α, β), `[...]`, for float64 α and β."""
     return torch.lgamma(alpha) + torch.lgamma(beta) - torch.lgamma(alpha + beta)
 
 
@@ -247,8 +247,8 @@ def _kl_scaled_beta_scaled_beta(p: ScaledBeta, q: ScaledBeta) -> Tensor:
     require_equal_bounds(p, q)
     (alpha_p, beta_p), (alpha_q, beta_q) = p._concentrations(), q._concentrations()
     divergence = (
-        _log_beta(alpha_q, beta_q)
-        - _log_beta(alpha_p, beta_p)
+        log_beta(alpha_q, beta_q)
+        - log_beta(alpha_p, beta_p)
         + (alpha_p - alpha_q) * torch.digamma(alpha_p)
         + (beta_p - beta_q) * torch.digamma(beta_p)
         + (alpha_q - alpha_p + beta_q - beta_p) * torch.digamma(alpha_p + beta_p)

@@ -3,8 +3,9 @@
 | Library           | Module                                    | What it gives                                      |
 |-------------------|-------------------------------------------|----------------------------------------------------|
 | stable-baselines3 | `inbounds.integrations.stable_baselines3` | `LogitNormalPolicy`, for PPO, A2C and TRPO         |
-| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, for any law of the book and a loss |
+| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, for `LogitNormal` and `ScaledBeta`  |
 
 Both keep the rule of the book: the library stores, and scores, the *latent*; the action is made from it on the way
-into the environment. Neither library is needed by the rest of the package: `pip install "inbounds[integrations]"`.
+into the environment. Neither library is needed by the rest of the package: `pip install ".[integrations]"`
+in the source tree.
 """

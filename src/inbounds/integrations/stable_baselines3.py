@@ -25,7 +25,9 @@ try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
     from stable_baselines3.common.policies import ActorCriticPolicy
 except ImportError as error:
-    raise ImportError('stable-baselines3 is not installed: pip install "inbounds[integrations]"') from error
+    raise ImportError(
+        'stable-baselines3 is not installed: pip install ".[integrations]" in the source tree'
+    ) from error
 
 __all__ = ["LogitNormalDistribution", "LogitNormalPolicy"]
 

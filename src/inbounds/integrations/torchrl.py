@@ -31,7 +31,7 @@ try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
     from torchrl.modules import ProbabilisticActor
 except ImportError as error:
-    raise ImportError('TorchRL is not installed: pip install "inbounds[integrations]"') from error
+    raise ImportError('TorchRL is not installed: pip install ".[integrations]" in the source tree') from error
 
 __all__ = ["PARAMETERS", "Latents", "bounded_actor"]
 

@@ -32,6 +32,7 @@ from torch import Tensor
 from torch.distributions import kl_divergence
 
 from inbounds.distributions import ClippedNormal, ScaledBeta
+from inbounds.distributions.scaled_beta import log_beta
 
 Array: TypeAlias = Any  # a Tensor or an NDArray, as `xp` says
 Sampler: TypeAlias = Callable[["Parameters", int], NDArray[Any]]
@@ -202,11 +203,6 @@ class BetaLaw:
 NORMAL = NormalLaw()
 CLIPPED_NORMAL = ClippedNormalLaw()
 BETA = BetaLaw()
-
-
-def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
-    """Return log B(α, β), `[...]`, for float64 α and β."""
-    return torch.lgamma(alpha) + torch.lgamma(beta) - torch.lgamma(alpha + beta)
 
 
 def clipped_normal(parameters: Parameters) -> ClippedNormal:

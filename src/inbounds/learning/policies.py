@@ -31,6 +31,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from inbounds.distributions import LogitNormal, trapezoid
+from inbounds.distributions.scaled_beta import log_beta
 from inbounds.learning import laws
 from inbounds.learning.laws import BETA, CLIPPED_NORMAL, NORMAL, Array, Law, Limits, Parameters
 
@@ -121,7 +122,7 @@ def beta_entropy(parameters: Parameters) -> Tensor:
         + (beta - 1) * torch.digamma(beta)
         - (alpha + beta - 2) * torch.digamma(alpha + beta)
     )
-    entropy = laws.log_beta(alpha, beta) - digammas + math.log(2)
+    entropy = log_beta(alpha, beta) - digammas + math.log(2)
     return entropy.sum(-1).to(parameters.first.dtype)
 
 

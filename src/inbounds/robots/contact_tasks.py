@@ -91,7 +91,7 @@ class Ant(ContactTask):
         return self._torso[:, :2].copy()
 
     def is_healthy(self) -> Flags:
-        """Not upside down or in the air, and all finite."""
+        """Neither too low nor too high, and all finite; an ant on its back may be healthy."""
         height = self.qpos[:, 2]
         is_finite = np.isfinite(self.qpos).all(axis=1) & np.isfinite(self.qvel).all(axis=1)
         return is_finite & (height >= 0.2) & (height <= 1.0)

@@ -179,6 +179,8 @@ def record(
 
     Raises:
         RuntimeError: there is no OpenGL to draw with; the message names the fix.
+        TypeError: the environment has no MuJoCo simulation.
+        IndexError: there is no robot of that index.
 
     Example:
         >>> import gymnasium
@@ -187,6 +189,7 @@ def record(
         >>> film.frames.shape, film.fps
         ((10, 64, 96, 3), 20.0)
     """
+    _simulation(env, index)  # says what is wrong before anything else fails for lack of it
     is_vector = hasattr(env, "num_envs")
     step_time = _step_time(env)
     stride = max(1, math.ceil(1 / (max_fps * step_time) - 1e-9))
@@ -202,6 +205,21 @@ def record(
             if not is_vector and (terminated or truncated):
                 obs, _ = env.reset()
     return Film(np.stack(frames), 1 / (stride * step_time), total_reward)
+
+
+def is_drawable(env: Any) -> bool:
+    """Say whether an environment has a MuJoCo simulation that `record` can film.
+
+    Example:
+        >>> import gymnasium
+        >>> is_drawable(gymnasium.make("Hopper-v5")), is_drawable(gymnasium.make("Pendulum-v1"))
+        (True, False)
+    """
+    try:
+        _simulation(env, 0)
+    except TypeError:
+        return False
+    return True
 
 
 def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], mujoco.MjData]]:

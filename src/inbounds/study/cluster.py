@@ -139,7 +139,7 @@ def _client(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError as error:
-        raise StudyError("--scheduler needs Dask: pip install 'inbounds[cluster]'") from error
+        raise StudyError("--scheduler needs Dask: pip install '.[cluster]' in the source tree") from error
     try:
         return Client(address, timeout="10s")
     except (OSError, ValueError) as error:
