@@ -384,6 +384,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/learning/test_run_store.py::test_a_policy_acts_as_its_network_did_in_training",
     ),
     Mutant(
+        "new episodes after a resumption are seen with new statistics",
+        "learning/rollout.py",
+        'self.normalizer.load_state_dict(state["normalizer"])',
+        "pass",
+        "tests/learning/test_training.py::test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics",
+    ),
+    Mutant(
         "another configuration goes on with the run",
         "cli/training.py",
         'if changes := _changes(config, state["config"]):',
@@ -519,8 +526,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "moments have too few nodes",
         "distributions/quadrature.py",
-        "num_nodes or (128 if double else 48)",
-        "num_nodes or (24 if double else 48)",
+        "num_nodes = 128 if double else 48",
+        "num_nodes = 24 if double else 48",
         "tests/distributions/test_logit_normal.py::test_mean_is_a_finite_sum_at_multiples_of_the_variance",
     ),
     Mutant(
