@@ -22,6 +22,14 @@ class SeedAdam:
         learning_rate: step size.
         eps: added to the root of the second moment.
         max_grad_norm: of a seed's gradient over all networks; None never clips.
+
+    Example:
+        >>> network = Mlp(2, (3, 1), torch.float32)
+        >>> before = network.theta.clone()
+        >>> adam = SeedAdam([network], learning_rate=0.1, eps=1e-8, max_grad_norm=None)
+        >>> adam.minimize(sum(p.sum() for p in network.parameters))
+        >>> round((network.theta - before).min().item(), 3)
+        -0.1
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-r"""Proximal policy optimisation (Schulman et al. 2017, section 3), for S seeds in lockstep.
+r"""Proximal policy optimisation (Schulman et al. 2017, sections 3 and 5), for S seeds in lockstep.
 
 With the ratio r(θ) = π_θ(z | s) / π_old(z | s) of the *latents'* densities, the clipped surrogate
 
@@ -99,6 +99,15 @@ def loss(networks: ActorCritic, batch: Minibatch, config: PPOConfig) -> Tensor:
 
     Returns:
         −L, a scalar.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
+        >>> rollout = trainer.collector.collect(64)
+        >>> advantage, return_ = rollout.advantages(gamma=0.99, gae_lambda=0.95)
+        >>> (batch,) = minibatches(rollout, advantage, return_, 64, [np.random.default_rng(s) for s in (0, 1)], True)
+        >>> loss(trainer.networks, batch, PPOConfig()).shape
+        torch.Size([])
     """
     policy = networks.policy
     parameters = networks.parameters(batch.obs)
@@ -130,6 +139,14 @@ def update(
     Returns:
         Diagnostics `[S]`: those of `diagnose`, and `clip_fraction`, the fraction of steps whose ratio ended
         beyond 1 ± ε.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
+        >>> rollout = trainer.collector.collect(128)
+        >>> shuffles = [stream.shuffle for stream in trainer.streams]
+        >>> sorted(update(trainer.networks, trainer.optimizer, rollout, shuffles, PPOConfig(horizon=128)))
+        ['approx_kl', 'clip_fraction', 'entropy', 'explained_variance', 'kl']
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     for _ in range(config.num_epochs):

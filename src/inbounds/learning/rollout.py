@@ -88,7 +88,15 @@ class Collector:
         action_mode: "clip" actions to the box before the environment sees them, or pass them "raw".
 
     Raises:
-        ValueError: the environments reset in another way, or are not as many as the seeds.
+        ValueError: the environments reset in another way, are not as many as the seeds, or have no Boxes of the
+            kind that `check_environments` asks for.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> collector = Trainer(preset("common", "Hopper-v5", seeds=2)).collector
+        >>> rollout = collector.collect(64)
+        >>> tuple(rollout.obs.shape), tuple(rollout.latent.shape)
+        ((2, 64, 11), (2, 64, 3))
     """
 
     def __init__(

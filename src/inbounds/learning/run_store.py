@@ -62,6 +62,15 @@ def save_run(run_dir: str | Path, trainer: Trainer) -> None:
     Args:
         run_dir: the folder; it must exist.
         trainer: the run, with at least one epoch done.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.learning import preset, train
+        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_run(folder, run)
+        ...     read_curves(folder).num_rows, len(load_policies(folder))
+        (2, 2)
     """
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)
@@ -121,7 +130,7 @@ def read_curves(run: str | Path) -> pa.Table:
         run: run directory, or the Parquet file itself.
 
     Returns:
-        The table, with the columns of `COLUMNS` that the algorithm records.
+        The table, with the columns of `COLUMNS` that the algorithm records. (`save_run` has an example.)
 
     Raises:
         FileNotFoundError: there are none.
@@ -183,6 +192,14 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
     Raises:
         FileNotFoundError: there are none.
         DamagedFileError: the file is damaged.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.learning import Trainer, preset
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_policies(f"{folder}/{POLICIES_FILE}", Trainer(preset("common", "Hopper-v5", seeds=2)))
+        ...     load_policies(folder)[1]
+        <TrainedPolicy: logit-normal, ppo, Hopper-v5, seed 1>
     """
     path = find(run, POLICIES_FILE)
     try:

@@ -26,6 +26,12 @@ class TrainedPolicy:
         normalizer: of one seed; None where the run does not normalise observations.
         low: `[A]` lower bounds of the action, in the robot's units.
         high: `[A]` upper bounds.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> policy = Trainer(preset("common", "Hopper-v5", seeds=2)).policies[1]
+        >>> policy.act(np.zeros(11)).shape, policy.act(np.zeros((5, 11)), "sample").shape
+        ((3,), (5, 3))
     """
 
     def __init__(

@@ -202,6 +202,12 @@ def train(
         ValueError: the run directory belongs to another configuration, or its checkpoint is damaged
             (`DamagedFileError`).
         OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
+
+    Example:
+        >>> from inbounds.learning.config import preset
+        >>> run = train(preset("common", "Swimmer-v5", policy="beta", seeds=2, epochs=1))
+        >>> run.finished, run.records[0]["diverged"].tolist()
+        (True, [False, False])
     """
     trainer = Trainer(config, make_envs)
     path = None

@@ -103,6 +103,14 @@ def kl_hessian_product(networks: ActorCritic, obs: Tensor) -> Product:
 
     Returns:
         The product, for v `[S, P]` in the order of `actor.theta`.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", policy="beta", algo="trpo", seeds=2))
+        >>> product = kl_hessian_product(trainer.networks, trainer.collector.collect(64).obs)
+        >>> v = torch.ones_like(trainer.networks.actor.theta)
+        >>> bool((dot(v, product(v)) > 0).all())  # [S, 1] vᵀFv
+        True
     """
     weights = networks.actor.parameters
     gradients = []
@@ -130,6 +138,14 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
 
     Returns:
         The product, for v `[S, P]` in the order of `actor.theta`.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
+        >>> rollout = trainer.collector.collect(64)
+        >>> product = sampled_fisher_product(trainer.networks, rollout.obs, rollout.latent)
+        >>> product(torch.zeros_like(trainer.networks.actor.theta)).abs().max().item()
+        0.0
     """
     weights = networks.actor.parameters
     log_prob = networks.policy.law.log_prob(networks.parameters(obs), latent)
@@ -145,7 +161,12 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
 
 
 def damped(product: Product, damping: float) -> Product:
-    """Return v ↦ F v + damping · v."""
+    """Return v ↦ F v + damping · v.
+
+    Example:
+        >>> damped(lambda v: 2 * v, 0.1)(torch.ones(1, 3)).tolist()
+        [[2.0999999046325684, 2.0999999046325684, 2.0999999046325684]]
+    """
     return lambda v: product(v) + damping * v
 
 
@@ -189,7 +210,22 @@ def dot(a: Tensor, b: Tensor) -> Tensor:
 def surrogate(
     networks: ActorCritic, rollout: Rollout, advantage: Tensor, entropy_coef: float
 ) -> tuple[Tensor, Parameters]:
-    """Return E[r Â] + c_H E[H] of each seed, `[S]`, and the law's parameters `[S, T, A]`."""
+    """Return E[r Â] + c_H E[H] of each seed, `[S]`, and the law's parameters `[S, T, A]`.
+
+    Args:
+        networks: the policies whose surrogate it is.
+        rollout: `[S, T, ...]`, with the log-densities of the policies that drew it.
+        advantage: `[S, T]`.
+        entropy_coef: c_H, per nat.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
+        >>> rollout = trainer.collector.collect(64)
+        >>> objective, _ = surrogate(trainer.networks, rollout, torch.ones(2, 64), entropy_coef=0.0)
+        >>> objective.detach().numpy().round(4).tolist()  # all ratios are 1 at the policies that drew it
+        [1.0, 1.0]
+    """
     policy = networks.policy
     parameters = networks.parameters(rollout.obs)
     ratio = torch.exp(policy.law.log_prob(parameters, rollout.latent) - rollout.log_prob)
@@ -225,6 +261,15 @@ def line_search(
 
     Returns:
         The outcome.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
+        >>> rollout, config = trainer.collector.collect(64), TRPOConfig(horizon=64)
+        >>> advantage = normalize_advantage(rollout.advantages(config.gamma, config.gae_lambda)[0])
+        >>> step = natural_step(trainer.networks, rollout, advantage, config)
+        >>> line_search(trainer.networks, rollout, advantage, step, config).accepted
+        tensor([True, True])
     """
     theta, law = networks.actor.theta, networks.policy.law
     start = theta.clone()
@@ -255,6 +300,14 @@ def natural_step(networks: ActorCritic, rollout: Rollout, advantage: Tensor, con
 
     Returns:
         Steps in the order of `actor.theta`; zero where the gradient is zero.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
+        >>> rollout = trainer.collector.collect(64)
+        >>> step = natural_step(trainer.networks, rollout, torch.zeros(2, 64), TRPOConfig(entropy_coef=0.0))
+        >>> step.shape == trainer.networks.actor.theta.shape, step.abs().max().item()  # no advantage, no step
+        (True, 0.0)
     """
     objective, _ = surrogate(networks, rollout, advantage, config.entropy_coef)
     gradient = flatten(torch.autograd.grad(objective.sum(), networks.actor.parameters))
@@ -286,6 +339,15 @@ def update(
 
     Returns:
         Diagnostics `[S]`: those of `diagnose`, `accepted` (1 or 0) and `step_fraction` of the line search.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
+        >>> rollout = trainer.collector.collect(128)
+        >>> shuffles = [stream.shuffle for stream in trainer.streams]
+        >>> told = update(trainer.networks, trainer.optimizer, rollout, shuffles, TRPOConfig(horizon=128))
+        >>> bool((told["kl"] <= 0.01).all())
+        True
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage
