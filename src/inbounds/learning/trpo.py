@@ -161,12 +161,7 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
 
 
 def damped(product: Product, damping: float) -> Product:
-    """Return v ↦ F v + damping · v.
-
-    Example:
-        >>> damped(lambda v: 2 * v, 0.1)(torch.ones(1, 3)).tolist()
-        [[2.0999999046325684, 2.0999999046325684, 2.0999999046325684]]
-    """
+    """Return v ↦ F v + damping · v."""
     return lambda v: product(v) + damping * v
 
 
@@ -339,15 +334,6 @@ def update(
 
     Returns:
         Diagnostics `[S]`: those of `diagnose`, `accepted` (1 or 0) and `step_fraction` of the line search.
-
-    Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
-        >>> rollout = trainer.collector.collect(128)
-        >>> shuffles = [stream.shuffle for stream in trainer.streams]
-        >>> told = update(trainer.networks, trainer.optimizer, rollout, shuffles, TRPOConfig(horizon=128))
-        >>> bool((told["kl"] <= 0.01).all())
-        True
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage
