@@ -143,7 +143,7 @@ def study(args: Sequence[str]) -> int:
             prog="inbounds study",
             description=description,
         )
-        if not isinstance(command, Run | Status) and not command.results.is_dir():
+        if isinstance(command, Ledger | Verify) and not command.results.is_dir():
             raise ValueError(
                 f"no folder {command.results} here: go to the source tree, or name it with --results"
             )
