@@ -96,15 +96,20 @@ def test_the_score_sheet_counts_every_robot_once(some: Outcomes) -> None:
 
 def test_the_differences_found_are_those_that_the_score_sheet_counts(some: Outcomes) -> None:
     rows = cells(study_pages.found_differences(some, "standard"))
-    assert {(robot, algorithm) for robot, algorithm, *_ in rows} <= {("Hopper", "PPO"), ("Ant", "PPO")}
-    by_pair = Counter(row[2] for row in rows if "\nhigher, p " in row[3] or "\nlower, p " in row[3])
+    names = [row[0].split("\n") for row in rows]
+    assert {name for name, _ in names} <= {"Hopper, PPO", "Ant, PPO"}
+    by_pair = Counter(
+        pair
+        for (_, pair), row in zip(names, rows, strict=True)
+        if "\nhigher, p " in row[1] or "\nlower, p " in row[1]
+    )
     counted = {row[1]: int(row[2]) + int(row[3]) for row in cells(study_pages.score_sheet(some))[:3]}
     assert {pair: by_pair[pair] for pair in counted} == counted
     contrast = Contrast("standard", "ppo", "logit-normal", "gaussian")
-    (row,) = [row for row in rows if row[0] == "Hopper" and row[2] == pair_name(contrast)]
-    for text, endpoint in zip(row[3:], analysis.ENDPOINTS, strict=True):
+    (row,) = [row for row in rows if row[0] == f"Hopper, PPO\n{pair_name(contrast)}"]
+    for text, endpoint in zip(row[1:], analysis.ENDPOINTS, strict=True):
         expected = analysis.differences(some, contrast, endpoint)["Hopper"]
-        assert text.startswith(f"{spoken(expected.difference)}\n{verdict(expected)}, p ")
+        assert text.replace("\n[", " [").startswith(f"{spoken(expected.difference)}\n{verdict(expected)}, p ")
 
 
 def test_published_scores_stand_beside_ours(some: Outcomes) -> None:

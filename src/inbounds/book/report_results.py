@@ -64,8 +64,8 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
         for contrast, by_endpoint in tested.items():
             comparisons = [by_robot[robot] for by_robot in by_endpoint]
             if any(verdict(each) in ("higher", "lower") for each in comparisons):
-                names = [robot, contrast.algorithm.upper(), pair_name(contrast)]
-                rows.append([*names, *map(_tested, comparisons)])
+                name = f"{robot}, {contrast.algorithm.upper()}\n{pair_name(contrast)}"
+                rows.append([name, *map(_tested, comparisons)])
     if not rows:
         return [html.paragraph("No difference is found among the finished cells.", "missing")]
     caption = (
@@ -73,12 +73,15 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
         f"permutation test after Holm's correction over {len(ROBOTS)} robots, whose p is given. In brackets a "
         f"{LEVEL:.0%} bootstrap interval. Final return and area are primary endpoints, the greedy return is secondary."
     )
-    return [html.table(caption, ["robot", "algorithm", "difference", *HEADS.values()], rows, range(6))]
+    return [html.table(caption, ["difference", *HEADS.values()], rows, range(4))]
 
 
 def _tested(comparison: Comparison) -> str:
     p = p_value(comparison.p_adjusted)
-    return f"{spoken(comparison.difference)}\n{verdict(comparison)}, p {p if '<' in p else f'= {p}'}"
+    interval = spoken(comparison.difference).replace(
+        " [", "\n["
+    )  # a line of its own: three columns fit a page
+    return f"{interval}\n{verdict(comparison)}, p {p if '<' in p else f'= {p}'}"
 
 
 PUBLISHED: Mapping[str, Mapping[str, tuple[str, str]]] = {
