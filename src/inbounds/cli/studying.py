@@ -182,10 +182,7 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
     else:
         console.print(status_table(cells, command.folder()))
         if not command.results.is_dir():
-            console.print(
-                f"no folder {command.results} here: go to the source tree, or name it with --results",
-                markup=False,
-            )
+            console.print(_no_folder(command.results), markup=False, soft_wrap=True)
     return 0
 
 
@@ -237,6 +234,10 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
         rerun = tuple(chooser.sample(finished, min(command.random, len(finished))))
     findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
     return 0 if all(finding.ok for finding in findings) else 1
+
+
+def _no_folder(results: Path) -> str:
+    return f"no folder {results} here: go to the source tree, or name it with --results"
 
 
 def _complain(message: str, code: int) -> int:
