@@ -101,7 +101,7 @@ def test_the_differences_found_are_those_that_the_score_sheet_counts(some: Outco
     by_pair = Counter(
         pair
         for (_, pair), row in zip(names, rows, strict=True)
-        if "\nhigher, p " in row[1] or "\nlower, p " in row[1]
+        if "\nhigher\np " in row[1] or "\nlower\np " in row[1]
     )
     counted = {row[1]: int(row[2]) + int(row[3]) for row in cells(study_pages.score_sheet(some))[:3]}
     assert {pair: by_pair[pair] for pair in counted} == counted
@@ -109,7 +109,7 @@ def test_the_differences_found_are_those_that_the_score_sheet_counts(some: Outco
     (row,) = [row for row in rows if row[0] == f"Hopper, PPO\n{pair_name(contrast)}"]
     for text, endpoint in zip(row[1:], analysis.ENDPOINTS, strict=True):
         expected = analysis.differences(some, contrast, endpoint)["Hopper"]
-        assert text.replace("\n[", " [").startswith(f"{spoken(expected.difference)}\n{verdict(expected)}, p ")
+        assert text.replace("\n[", " [").startswith(f"{spoken(expected.difference)}\n{verdict(expected)}\np ")
 
 
 def test_published_scores_stand_beside_ours(some: Outcomes) -> None:

@@ -81,7 +81,7 @@ def _tested(comparison: Comparison) -> str:
     interval = spoken(comparison.difference).replace(
         " [", "\n["
     )  # a line of its own: three columns fit a page
-    return f"{interval}\n{verdict(comparison)}, p {p if '<' in p else f'= {p}'}"
+    return f"{interval}\n{verdict(comparison)}\np {p if '<' in p else f'= {p}'}"
 
 
 PUBLISHED: Mapping[str, Mapping[str, tuple[str, str]]] = {
