@@ -130,9 +130,8 @@ def test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics() -> N
     first, _ = forgetful(3).reset(seed=[stream.environment for stream in collector.streams])
     assert collector.normalizer.count == run.collector.normalizer.count + 1
     assert np.array_equal(collector.obs, collector.normalizer(first))
-    assert (
-        np.abs(collector.obs).max() > 0.1
-    )  # fresh statistics would have seen nothing but these: all would be 0
+    # Fresh statistics would have seen nothing but these observations: all would be 0.
+    assert np.abs(collector.obs).max() > 0.1
 
 
 KILLED = """

@@ -78,9 +78,8 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
 
 def _tested(comparison: Comparison) -> str:
     p = p_value(comparison.p_adjusted)
-    interval = spoken(comparison.difference).replace(
-        " [", "\n["
-    )  # a line of its own: three columns fit a page
+    # The interval has a line of its own, so that three columns fit a page.
+    interval = spoken(comparison.difference).replace(" [", "\n[")
     return f"{interval}\n{verdict(comparison)}\np {p if '<' in p else f'= {p}'}"
 
 

@@ -144,9 +144,7 @@ def study(args: Sequence[str]) -> int:
             description=description,
         )
         if isinstance(command, Ledger | Verify) and not command.results.is_dir():
-            raise ValueError(
-                f"no folder {command.results} here: go to the source tree, or name it with --results"
-            )
+            raise ValueError(_no_folder(command.results))
         if isinstance(command, Ledger):
             return _ledger(command, console)
         cells = command.chosen()

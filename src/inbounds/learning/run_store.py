@@ -61,16 +61,7 @@ def save_run(run_dir: str | Path, trainer: Trainer) -> None:
 
     Args:
         run_dir: the folder; it must exist.
-        trainer: the run, with at least one epoch done.
-
-    Example:
-        >>> import tempfile
-        >>> from inbounds.learning import preset, train
-        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     save_run(folder, run)
-        ...     read_curves(folder).num_rows, len(load_policies(folder))
-        (2, 2)
+        trainer: the run, with at least one epoch done. (`load_policy` has an example.)
     """
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)
@@ -130,7 +121,7 @@ def read_curves(run: str | Path) -> pa.Table:
         run: run directory, or the Parquet file itself.
 
     Returns:
-        The table, with the columns of `COLUMNS` that the algorithm records. (`save_run` has an example.)
+        The table, with the columns of `COLUMNS` that the algorithm records. (`write_curves` has an example.)
 
     Raises:
         FileNotFoundError: there are none.

@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from inbounds.learning.files import DamagedFileError
-from inbounds.learning.stored_config import differences
+from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
 from inbounds.study import store
 from inbounds.study.grid import Cell
 from inbounds.study.measure import MeasuredTrainer
@@ -151,7 +151,7 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
         return Finding(cell.id, False, str(error))
     epochs = min(epochs, cell.epochs)
     run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
-    if different := differences(run.config, metadata["config"], free=("epochs", "checkpoint_every")):
+    if different := differences(run.config, metadata["config"], FREE_TO_CHANGE):
         said = ", ".join(different)
         return Finding(cell.id, False, f"its file was made with another configuration ({said})")
     for _ in range(epochs):
