@@ -580,6 +580,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/learning/test_own_environment.py::test_a_box_is_a_choice_of_units",
     ),
     Mutant(
+        "a distribution keeps the unit interval's scale",
+        "learning/policies.py",
+        "half_range * parameters.first, half_range * parameters.second.exp()",
+        "half_range * parameters.first, parameters.second.exp()",
+        "tests/learning/test_policies.py::test_the_distribution_has_the_density_of_the_mapped_latent",
+    ),
+    Mutant(
         "Holm's ranks run backwards",
         "book/graders_comparison.py",
         "rank = np.array([1 + np.sum(p < x)",

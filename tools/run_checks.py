@@ -9,7 +9,7 @@ CHECKS = {
     "format": ["ruff", "format", "--check", "."],
     "lint": ["ruff", "check", "."],
     "types": ["mypy"],
-    "doctests": ["pytest", "-q", "--doctest-modules", "src/inbounds"],
+    "doctests": ["pytest", "-q", "--doctest-modules", "src/inbounds", "benchmarks"],
     "notebooks": ["tools/notebook_hook.py", "--check"],
 }
 

@@ -77,6 +77,28 @@ def test_greedy_actions_are_those_of_the_law_over_actions(family: str) -> None:
         assert np.allclose(bound.greedy(rows, by), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("family", NAMES)
+def test_the_distribution_has_the_density_of_the_mapped_latent(family: str) -> None:
+    rows = torch.tensor([[0.4, -0.2, 0.1, -0.6]], dtype=torch.float64)
+    bound = policy(family)
+    latent = torch.tensor([[0.3, 0.8], [0.51, 0.25]], dtype=torch.float64)  # inside, for every family
+    action, step = bound.action(latent.numpy()), 1e-6
+    slope = (bound.action(latent.numpy() + step) - bound.action(latent.numpy() - step)) / (2 * step)
+    expected = bound.law.log_prob(bound.parameters(rows), latent).numpy() - np.log(slope).sum(-1)
+    density = bound.distribution(rows).log_prob(torch.from_numpy(action)).sum(-1)
+    assert density.shape == (2,)
+    assert np.allclose(density, expected, atol=1e-8)
+
+
+def test_the_clipped_gaussians_distribution_has_its_mass_on_the_bounds() -> None:
+    rows = torch.tensor([[0.4, -0.2, 0.1, -0.6]], dtype=torch.float64)
+    bound = policy("clipped-gaussian")
+    beyond = torch.tensor([[1.5, -2.0]], dtype=torch.float64)
+    on_bounds = torch.tensor([[HIGH[0], LOW[1]]])
+    mass = bound.distribution(rows).log_prob(on_bounds).sum(-1)
+    assert torch.allclose(mass, bound.law.log_prob(bound.parameters(rows), beyond), atol=1e-9)
+
+
 def test_an_unknown_greedy_action_is_refused_with_the_choices() -> None:
     with pytest.raises(ValueError, match="beta offers the greedy actions mean, median, mode, not 'best'"):
         policy("beta").greedy(torch.zeros(4), "best")

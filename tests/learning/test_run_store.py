@@ -144,6 +144,23 @@ def test_a_run_in_raw_mode_may_leave_the_box(tmp_path: Path) -> None:
         assert (np.abs(policy.act(np.zeros(3), "mean")) <= 1).all()
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_distribution_is_of_the_action_in_that_state(family: str, tmp_path: Path) -> None:
+    saved_run(tmp_path, family=family, action_mode="clip")
+    policy = load_policy(tmp_path)
+    obs = rng().normal(size=(4, 3))
+    law = policy.distribution(obs)
+    assert np.allclose(law.mode.clip(-1, 1), policy.act(obs, "mode"), atol=1e-6)
+    single = policy.distribution(obs[1])
+    assert single.mean.shape == (2,)
+    assert np.allclose(single.mean, law.mean[1], atol=1e-6)
+    drawn = policy.act(np.tile(obs[1], (4000, 1)), "sample", rng())
+    again = single.sample((4000,)).clip(-1, 1).numpy()
+    assert stats.ks_2samp(drawn[:, 0], again[:, 0]).pvalue > 1e-3
+    with pytest.raises(ValueError, match=r"shape \[3\] or \[B, 3\], got \[4\]"):
+        policy.distribution(np.zeros(4))
+
+
 def test_what_is_asked_of_a_policy_wrongly(tmp_path: Path) -> None:
     saved_run(tmp_path)
     policy = load_policy(tmp_path)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from inbounds.book import report_page as html
 from inbounds.book.report_aggregates import HEADS
 from inbounds.book.report_arms import title_of
-from inbounds.book.report_words import p_value, pair_name, spoken, verdict
+from inbounds.book.report_words import p_equals, pair_name, spoken, verdict
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS
 from inbounds.study.grid import ROBOTS
@@ -77,10 +77,9 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
 
 
 def _tested(comparison: Comparison) -> str:
-    p = p_value(comparison.p_adjusted)
     # The interval has a line of its own, so that three columns fit a page.
     interval = spoken(comparison.difference).replace(" [", "\n[")
-    return f"{interval}\n{verdict(comparison)}\np {p if '<' in p else f'= {p}'}"
+    return f"{interval}\n{verdict(comparison)}\n{p_equals(comparison.p_adjusted)}"
 
 
 PUBLISHED: Mapping[str, Mapping[str, tuple[str, str]]] = {

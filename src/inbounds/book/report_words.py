@@ -8,9 +8,9 @@ from inbounds.book.figures import FAMILIES
 from inbounds.book.study_figures import SHORT
 from inbounds.study.analysis import Contrast
 from inbounds.study.statistics import Estimate
-from inbounds.study.words import number, p_value, spoken, verdict
+from inbounds.study.words import number, p_equals, p_value, spoken, verdict
 
-__all__ = ["in_words", "number", "p_value", "pair_name", "spoken", "verdict"]
+__all__ = ["in_words", "number", "p_equals", "p_value", "pair_name", "spoken", "verdict"]
 
 
 def pair_name(contrast: Contrast) -> str:

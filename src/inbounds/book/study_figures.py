@@ -33,6 +33,7 @@ from inbounds.book.study_panels import (
     without_scale,
 )
 from inbounds.study.statistics import Comparison, Estimate, Profile
+from inbounds.study.words import p_equals
 
 __all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "performance_profiles"]
 
@@ -178,7 +179,7 @@ def difference_panels(
     rows = {pair: (f"{SHORT[pair[0]]}\n− {SHORT[pair[1]]}", pair[0]) for pair in pairs}
     cells = {
         title: {
-            pair: (row.difference, _p_value(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
+            pair: (row.difference, p_equals(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
             for pair in pairs
         }
         for title, given in panels.items()
@@ -190,10 +191,6 @@ def difference_panels(
         reference=0.0,
         remark="p: permutation test of the means, after Holm's correction over environments.",
     )
-
-
-def _p_value(p: float) -> str:
-    return "" if np.isnan(p) else "p < 0.001" if p < 0.001 else f"p = {p:.3f}" if p < 0.1 else f"p = {p:.2f}"
 
 
 def _bars(

@@ -29,8 +29,9 @@ from numpy.typing import NDArray
 from scipy.special import betaincinv
 from torch import Tensor
 from torch.autograd.function import once_differentiable
+from torch.distributions import Distribution, Normal
 
-from inbounds.distributions import LogitNormal, trapezoid
+from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta, trapezoid
 from inbounds.distributions.scaled_beta import log_beta
 from inbounds.learning import laws
 from inbounds.learning.laws import BETA, CLIPPED_NORMAL, NORMAL, Array, Law, Limits, Parameters
@@ -49,6 +50,7 @@ class Family:
         entropy_name: which entropy `entropy` is, in words.
         entropy: of parameters `[..., A]`, summed over A: `[...]`, in nats.
         greedy: ways to act without noise, by name: parameters `[..., A]` to unit actions `[..., A]`.
+        distribution: of the action, elementwise: parameters `[..., A]` and the box's low and high `[A]`.
     """
 
     law: Law
@@ -56,6 +58,7 @@ class Family:
     entropy_name: str
     entropy: Callable[[Parameters], Tensor]
     greedy: Mapping[str, Callable[[Parameters], Tensor]]
+    distribution: Callable[[Parameters, Tensor, Tensor], Distribution]
 
 
 def normal_entropy(parameters: Parameters) -> Tensor:
@@ -133,6 +136,12 @@ def beta_median(parameters: Parameters) -> Tensor:
     return (2 * half - 1).to(parameters.first.dtype)
 
 
+def _in_box(parameters: Parameters, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
+    """Return location and scale of a Normal latent in the robot's units."""
+    half_range = (high - low) / 2
+    return (low + high) / 2 + half_range * parameters.first, half_range * parameters.second.exp()
+
+
 def _logit_normal(parameters: Parameters) -> LogitNormal:
     return LogitNormal(parameters.first, parameters.second.exp(), -1.0, 1.0, validate_args=False)
 
@@ -145,6 +154,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
             entropy_name="differential entropy of the unclipped Normal",
             entropy=normal_entropy,
             greedy={name: lambda p: p.first for name in ("mean", "median", "mode")},
+            distribution=lambda p, low, high: Normal(*_in_box(p, low, high)),
         ),
         "clipped-gaussian": Family(
             law=CLIPPED_NORMAL,
@@ -156,6 +166,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
                 "median": lambda p: laws.clipped_normal(p).median,
                 "mode": lambda p: laws.clipped_normal(p).mode,
             },
+            distribution=lambda p, low, high: ClippedNormal(*_in_box(p, low, high), low, high),
         ),
         "beta": Family(
             law=BETA,
@@ -167,6 +178,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
                 "median": beta_median,
                 "mode": lambda p: laws.scaled_beta(p).mode,
             },
+            distribution=lambda p, low, high: ScaledBeta(*p, low, high),
         ),
         "logit-normal": Family(
             law=NORMAL,
@@ -178,6 +190,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
                 "median": lambda p: _logit_normal(p).median,
                 "mode": lambda p: _logit_normal(p).mode,
             },
+            distribution=lambda p, low, high: LogitNormal(p.first, p.second.exp(), low, high),
         ),
     }
 )
@@ -254,6 +267,18 @@ class Policy:
         unit = self.unit_action(latent)
         centre, half_range = self.centre.astype(unit.dtype), self.half_range.astype(unit.dtype)
         return centre + half_range * unit
+
+    def distribution(self, outputs: Tensor) -> Distribution:
+        """Return the distribution of the action, elementwise `[..., A]`, in the robot's units and in float64.
+
+        A sum of its `log_prob` over A is the joint log-density. For `gaussian` it is the Normal that is drawn from,
+        before any clip.
+
+        Args:
+            outputs: `[..., 2A]` of the policy network.
+        """
+        parameters = Parameters(*(x.double() for x in self.parameters(outputs)))
+        return self.family.distribution(parameters, torch.from_numpy(self.low), torch.from_numpy(self.high))
 
     def entropy(self, outputs: Tensor) -> Tensor:
         """Return the family's bonus entropy `[...]` for outputs `[..., 2A]`, in nats."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch.distributions import Distribution
 
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.networks import Mlp
@@ -109,6 +110,44 @@ class TrainedPolicy:
             ValueError: observations of another size or not finite, or a greedy action that the family
                 does not offer.
         """
+        outputs, shape = self._outputs(obs)
+        if greedy == "sample":
+            action = self._sample(outputs, np.random.default_rng() if rng is None else rng)
+        elif greedy in self.greedy_choices:
+            action = self._policy.greedy(torch.from_numpy(outputs), greedy)
+        else:
+            raise ValueError(
+                f"{self.config.policy.family} does not act by {greedy!r}: "
+                f"choose one of {', '.join(self.greedy_choices)}"
+            )
+        return action.astype(self.low.dtype).reshape(shape)
+
+    def distribution(self, obs: NDArray[Any]) -> Distribution:
+        """Return the distribution of the action in each state: its parameters, its density, its samples, in torch.
+
+        Args:
+            obs: `[O]` or `[B, O]`, as the environment has them.
+
+        Returns:
+            `torch.distributions.Normal`, or `ClippedNormal`, `ScaledBeta` or `LogitNormal` of
+            `inbounds.distributions`, by the family: `[A]` or `[B, A]`, elementwise, in the robot's units, float64.
+            For `gaussian` the Normal that is drawn from, before any clip.
+
+        Raises:
+            ValueError: observations of another size or not finite.
+
+        Example:
+            >>> from inbounds.learning import Trainer, preset
+            >>> policy = Trainer(preset("common", "Hopper-v5", seeds=1)).policies[0]
+            >>> law = policy.distribution(np.zeros((5, 11)))
+            >>> type(law).__name__, tuple(law.scale.shape), tuple(law.log_prob(law.sample()).sum(-1).shape)
+            ('LogitNormal', (5, 3), (5,))
+        """
+        outputs, shape = self._outputs(obs)
+        return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], -1))
+
+    def _outputs(self, obs: NDArray[Any]) -> tuple[NDArray[Any], tuple[int, ...]]:
+        """Return the network's outputs `[B, 2A]` and the shape that actions for `obs` have."""
         obs = np.asarray(obs)
         if obs.ndim not in (1, 2) or obs.shape[-1] != self._network.sizes[0]:
             raise ValueError(
@@ -122,17 +161,8 @@ class TrainedPolicy:
             )
         batch = np.atleast_2d(obs)  # [B, O]
         seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
-        outputs = self._network.act(seen)  # [B, 2A]: the weights of one seed serve every row
-        if greedy == "sample":
-            action = self._sample(outputs, np.random.default_rng() if rng is None else rng)
-        elif greedy in self.greedy_choices:
-            action = self._policy.greedy(torch.from_numpy(outputs), greedy)
-        else:
-            raise ValueError(
-                f"{self.config.policy.family} does not act by {greedy!r}: "
-                f"choose one of {', '.join(self.greedy_choices)}"
-            )
-        return action.astype(self.low.dtype).reshape(*obs.shape[:-1], -1)
+        outputs = self._network.act(seen)  # the weights of one seed serve every row
+        return outputs, (*obs.shape[:-1], len(self.low))
 
     def _sample(self, outputs: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
         draw = self._policy.law.sampler([rng] * len(outputs), 1, self._policy.act_dim, self._dtype)

@@ -33,6 +33,17 @@ def p_value(p: float) -> str:
     return "" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
+def p_equals(p: float) -> str:
+    """Say a p-value in a sentence or beside a bar, where no heading names it.
+
+    Example:
+        >>> p_equals(0.02), p_equals(1e-5)
+        ('p = 0.020', 'p < 0.001')
+    """
+    value = p_value(p)
+    return f"p {value}" if value.startswith("<") else f"p = {value}" if value else ""
+
+
 def verdict(comparison: Comparison, level: float = 1 - LEVEL) -> str:
     """Say in a word what a comparison shows.
 

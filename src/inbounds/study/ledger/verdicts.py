@@ -37,7 +37,7 @@ import numpy as np
 from inbounds.study.grid import select
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import Estimate
-from inbounds.study.words import p_value, spoken
+from inbounds.study.words import p_equals, spoken
 
 State: TypeAlias = Literal["for", "against", "open", "moot", "missing"]
 Verdict: TypeAlias = Literal["supported", "refuted", "undecided"]
@@ -83,8 +83,7 @@ class Statement:
             return f"{self.about}: missing"
         if self.exact:
             return f"{self.about}: {float(self.estimate.value):.0e} ({self.state})"
-        p = p_value(self.p_adjusted)
-        told = f", p {p if p.startswith('<') else f'= {p}'}" if p else ""
+        told = f", {p}" if (p := p_equals(self.p_adjusted)) else ""
         state = "open, not after Holm" if self.by_holm else self.state
         return f"{self.about}: {spoken(self.estimate, self.digits)}{told} ({state})"
 
