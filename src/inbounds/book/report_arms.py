@@ -198,7 +198,7 @@ def without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells)
 
 
 _DIAGNOSTICS: Mapping[str, str] = {
-    "action_std": "executed std [half range]",
+    "action_std": "spread of executed actions [half range]",
     "saturation": "saturation",
     "explained_variance": "explained variance",
     "kl": "KL [nats]",
@@ -218,8 +218,8 @@ def diagnostics(title: str, cells: Cells) -> str:
                 rows.append([robot, FAMILIES[family].label, *numbers, _first_and_last(clamps)])
     caption = (
         f"What happened inside ({title}): medians over seeds, of the first epoch → of the last five "
-        "measurements. Executed noise, saturation and clamps of the first epoch are the untrained policy's. "
-        "These numbers describe; they decide nothing."
+        "measurements. Spread, saturation and clamps of the first epoch are the untrained policy's: its noise. Later "
+        "most of the spread is the policy's own movement. These numbers describe; they decide nothing."
     )
     return html.table(caption, head, rows, words=(0, 1))
 

@@ -20,7 +20,8 @@ CAUSES = [
         "The gain comes from the bounded support.",
         "ch. 6, 1st paragraph; ch. 7",
         "Final return: with equal executed noise at the start, at least half of the gain (logit-normal − "
-        "Gaussian) is left on every robot that has one.",
+        "Gaussian) is left on every robot with such cells that has one. (That would exclude the noise at the "
+        "start as the cause; it would not show that the bounds are it.)",
         half_remains(
             EQUALLY_LOUD,
             AS_THEY_START,
@@ -83,7 +84,7 @@ PARTS = [
     Claim(
         "large-beta",
         _PARTS,
-        "So do those of the Beta.",
+        "The parameters of the Beta become large in some cases.",
         "ch. 6, 3rd paragraph",
         "Last measurements, as printed: in at least one cell more than 1 % of the α and β are at their "
         "cap of 80.",
@@ -129,7 +130,7 @@ TRUST = [
     Claim(
         "fisher-time",
         _TRUST,
-        "It is also cheaper.",
+        "The Hessian of a closed-form KL is also cheaper than a sampled Fisher matrix.",
         "section 2.3",
         "Processor time of the eleven products of an update: the sampled ones take longer. Measured when "
         "the page was built.",

@@ -51,19 +51,19 @@ STARTS = [
     Claim(
         "start-cause",
         _START,
-        "It starts low because its samples leave the box.",
+        "The Gaussian starts low because its samples leave the box.",
         "ch. 6, 2nd paragraph",
         f"Untrained policies: where both families execute noise of {computed.LOUD}, and only the Gaussian leaves "
-        "the box, at least half of the gap (logit-normal − Gaussian) is left on every robot that has one.",
+        "the box, at least half of the gap (logit-normal − Gaussian) is left on every one of three robots.",
         computed.loud_starts(("HalfCheetah", "Hopper", "Walker2d")),
     ),
     Claim(
         "start-noise",
         _START,
-        "It starts low because it starts loud: with equal noise the gap closes.",
+        "The Gaussian starts low because it starts loud: with equal noise the gap closes.",
         "this book, Part IV",
         "First epoch: with equal executed noise (0.4) less than half of the gap (logit-normal − Gaussian) is left on "
-        "every robot that has one.",
+        "every robot with such cells that has one.",
         half_remains(
             EQUALLY_LOUD,
             AS_THEY_START,
@@ -76,7 +76,7 @@ STARTS = [
     Claim(
         "start-raw",
         _START,
-        "It starts lower still where the reward charges for the action as drawn, beyond the box.",
+        "The Gaussian starts lower still where the reward charges for the action as drawn, beyond the box.",
         "this book, Part I",
         "First epoch, Gaussian: raw cost − clipped cost below 0 on both robots.",
         changes(cells("mechanisms", "ppo", "gaussian-raw-cost"), -1, START),
@@ -108,7 +108,7 @@ WINS = [
         Claim(
             f"wins-beta-{arm}",
             _WINS,
-            f"So does the Beta policy (PPO, {words}).",
+            f"The Beta beats the Gaussian on four of six robots (PPO, {words}).",
             "ch. 5, PPO; ch. 6, 1st paragraph",
             f"Final return: Beta − Gaussian above 0 on at least four robots ({TEST}).",
             beats(Contrast(arm, "ppo", "beta", "gaussian")),
@@ -229,7 +229,7 @@ SWIMMER = [
     Claim(
         "swimmer-order",
         _SWIMMER,
-        "With the longer horizon the Gaussian is still ahead there.",
+        "With the longer horizon the Gaussian is still ahead on Swimmer.",
         "follows from ch. 5",
         "Final return with 0.9999: Gaussian − other above 0, PPO and TRPO, Beta and logit-normal.",
         gaps(
