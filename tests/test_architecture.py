@@ -1,6 +1,8 @@
 """The rules of the house: imports go one way, the package is light, files stay readable."""
 
 import ast
+import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +20,8 @@ MAY_IMPORT = {
     "cli": {"distributions", "robots", "learning", "study", "book"},
 }
 MODULES = sorted(PACKAGE.rglob("*.py"))
+API = (PACKAGE.parents[1] / "book" / "api.md").read_text(encoding="utf8")
+FUNCTIONS = re.findall(r"\.\. autofunction:: (\S+)", API)
 
 
 def room_of(path: Path) -> str:
@@ -64,3 +68,10 @@ def test_importing_is_light(statement: str) -> None:
 @pytest.mark.parametrize("path", MODULES, ids=str)
 def test_a_file_can_be_read_in_one_sitting(path: Path) -> None:
     assert len(path.read_text(encoding="utf8").splitlines()) <= 350
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_documented_function_has_an_example_or_says_who_has(name: str) -> None:
+    module, _, function = name.rpartition(".")
+    doc = getattr(importlib.import_module(module), function).__doc__
+    assert ">>>" in doc or "has an example" in doc

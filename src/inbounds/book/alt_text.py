@@ -67,6 +67,12 @@ def show(fig: Figure, alt: str) -> None:
 
     Raises:
         ValueError: If the alt text says less than a sentence would.
+
+    Example:
+        >>> import matplotlib.pyplot as plt
+        >>> show(plt.figure(), alt="A figure.")
+        Traceback (most recent call last):
+        ValueError: alt text 'A figure.' is too short: say in a sentence what is plotted and what it shows
     """
     from IPython.display import display
 

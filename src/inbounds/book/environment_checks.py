@@ -219,6 +219,11 @@ def complaints(make: MakeEnvs) -> dict[str, str]:
 
     Returns:
         By check, what is wrong; empty if nothing is.
+
+    Example:
+        >>> from inbounds import robots
+        >>> complaints(lambda seeds: robots.make("Swimmer-v5", seeds))
+        {}
     """
     found: dict[str, str] = {}
     for name, check in CHECKS.items():

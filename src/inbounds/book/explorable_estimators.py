@@ -117,6 +117,10 @@ def score_estimators(
 
     Raises:
         ValueError: If a value lies outside its slider.
+
+    Example:
+        >>> score_estimators(peak=1.5).name
+        'score-estimators'
     """
     log_sigma = float(np.log(sigma)) if sigma > 0 else -np.inf
     inside = abs(mu) <= 2.4 and -2.31 <= log_sigma <= 1.0 and abs(peak) <= 1.5 and 0.0 <= share <= 1.0

@@ -94,6 +94,10 @@ def greedy_actions(mu: float = 0.3, sigma: float = 1.6) -> Explorable:
 
     Raises:
         ValueError: If μ or σ lies outside its slider.
+
+    Example:
+        >>> greedy_actions(sigma=0.5).name
+        'greedy-action'
     """
     log_sigma = float(np.log(sigma)) if sigma > 0 else -np.inf
     if not (_MU[0] <= mu <= _MU[1] and _LOG_SIGMA[0] <= log_sigma <= _LOG_SIGMA[1]):

@@ -89,6 +89,10 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
 
     Raises:
         ValueError: If a parameter lies outside its slider.
+
+    Example:
+        >>> kl_of_two_policies(new=(1.0, 0.5)).name
+        'kl-of-two-policies'
     """
     for role, (mu, sigma) in (("old", old), ("new", new)):
         log_sigma = float(np.log(sigma)) if sigma > 0 else -np.inf

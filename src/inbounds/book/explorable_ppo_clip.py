@@ -73,6 +73,10 @@ def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2
 
     Raises:
         ValueError: If a value lies outside its slider.
+
+    Example:
+        >>> ppo_clip(ratio=0.5, advantage=-1.0).name
+        'ppo-clip'
     """
     values = (ratio, _RATIO), (advantage, _ADVANTAGE), (clip_range, _CLIP_RANGE)
     if not all(low <= value <= high for value, (low, high) in values):

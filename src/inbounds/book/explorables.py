@@ -103,6 +103,10 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
 
     Raises:
         ValueError: If μ or σ lies outside its slider.
+
+    Example:
+        >>> bounded_densities(mu=0.5).name
+        'bounded-densities'
     """
     log_sigma = float(np.log(sigma)) if sigma > 0 else -np.inf
     if not (-4.0 <= mu <= 4.0 and -3.0 <= log_sigma <= 1.0):

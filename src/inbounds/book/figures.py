@@ -199,6 +199,12 @@ def density_panels(
 
     Returns:
         The figure; densities above :data:`MAX_DENSITY` leave it at the top.
+
+    Example:
+        >>> from inbounds.distributions import LogitNormal
+        >>> fig = density_panels([("wide", [("σ = 2", LogitNormal(torch.tensor(0.0), torch.tensor(2.0)))])])
+        >>> [ax.get_title() for ax in fig.axes]
+        ['wide']
     """
     # Open interval: the densities are defined inside only, some are unbounded at the ends.
     inside = np.linspace(low, high, 2003)[1:-1]
@@ -273,6 +279,11 @@ def saturation_histogram(
 
     Raises:
         ValueError: If a family is unknown, or an action is missing, not finite, or out of bounds.
+
+    Example:
+        >>> fig = saturation_histogram({"gaussian": [-1.0, 0.2, 1.0, 1.0], "beta": [-0.5, 0.5, 0.1, 0.9]})
+        >>> len(fig.axes)
+        2
     """
     columns = min(2, len(actions))
     rows = -(-len(actions) // columns) if columns else 0

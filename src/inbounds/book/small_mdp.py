@@ -227,6 +227,10 @@ def ledge(
         grip: probability that a push moves the rover by a cell.
         battery: probability that the episode goes on after a step.
         fall: what a fall costs.
+
+    Example:
+        >>> ledge(cells=4).reward.shape  # cells; constant, linear and quadratic term in the action
+        torch.Size([4, 3])
     """
     left, right = _corridor(cells, grip)
     reward = torch.tensor([0.0, 1.0, -0.1], dtype=torch.float64).repeat(cells, 1)
@@ -248,6 +252,10 @@ def slope(
         grip: probability that a push moves the rover by a cell.
         battery: probability that the episode goes on after a step.
         climb: cost of a full push uphill; a full push downhill is free.
+
+    Example:
+        >>> slope(cells=4).start.tolist()
+        [0.25, 0.25, 0.25, 0.25]
     """
     left, right = _corridor(cells, grip)
     right[-1, -1] = 1.0

@@ -48,6 +48,14 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
 
     Returns:
         The path.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.study import StudyFolder
+        >>> nothing = Outcomes.read(StudyFolder(Path("no/results")))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     "Claims" in write_report(nothing, Path(folder) / "report.html").read_text()
+        True
     """
     sections = [("state", "What there is"), *TITLES.items(), ("claims", "Claims of the source thesis")]
     sections.append(("provenance", "Provenance"))

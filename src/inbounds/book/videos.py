@@ -125,6 +125,14 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
     Raises:
         ValueError: odd width or height.
         RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.robots import Film
+        >>> black = Film(np.zeros((4, 32, 32, 3), np.uint8), fps=20, total_reward=0.0)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     write_film(Path(folder) / "black.mp4", black).stat().st_size > 0
+        True
     """
     path = Path(path)
     path.write_bytes(_encode(film, _FILE_QUANTISER))

@@ -228,7 +228,12 @@ class ScaledBeta(SigmoidMapped):
 
 
 def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
-    """Return log B(α, β), `[...]`, for float64 α and β."""
+    """Return log B(α, β), `[...]`, for float64 α and β.
+
+    Example:
+        >>> log_beta(torch.tensor(2.0, dtype=torch.float64), torch.tensor(3.0, dtype=torch.float64)).exp().item() * 12
+        1.0
+    """
     return torch.lgamma(alpha) + torch.lgamma(beta) - torch.lgamma(alpha + beta)
 
 

@@ -37,6 +37,11 @@ def find(run: str | Path, name: str) -> Path:
 
     Raises:
         FileNotFoundError: there is no such file.
+
+    Example:
+        >>> find("no/run", "policies.safetensors")
+        Traceback (most recent call last):
+        FileNotFoundError: there is no no/run: train a run first (inbounds train --out no)
     """
     path = Path(run)
     if path.is_dir():
@@ -53,6 +58,10 @@ def damaged(path: Path, reason: object, remedy: str = "") -> DamagedFileError:
         path: of the file.
         reason: why it cannot be read, an exception or words; its first line is quoted.
         remedy: what to do; by default, to have the file written anew from the checkpoint.
+
+    Example:
+        >>> print(damaged(Path("curves.parquet"), "no footer.", remedy="train again"))
+        curves.parquet is damaged, cut short or of another origin (no footer): train again
     """
     remedy = remedy or (
         "repeat the `inbounds train` command of this run, which writes it anew from the checkpoint beside it, "
@@ -71,6 +80,13 @@ def write_whole(path: Path, data: Any) -> None:
 
     Raises:
         OSError: it could not be written, as on a full disk; the old file is untouched.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     write_whole(Path(folder) / "file", b"all of it")
+        ...     (Path(folder) / "file").read_bytes()
+        b'all of it'
     """
     temporary = path.with_name(f".{path.name}.partial")
     try:

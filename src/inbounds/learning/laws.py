@@ -42,7 +42,12 @@ HALF_LOG_2PI = math.log(2 * math.pi) / 2
 
 
 class Parameters(NamedTuple):
-    """The parameters of a law, `[..., A]` each: (loc, log_scale) or (concentration1, concentration0)."""
+    """The parameters of a law, `[..., A]` each: (loc, log_scale) or (concentration1, concentration0).
+
+    Example:
+        >>> Parameters(torch.zeros(3), torch.ones(3)).detach().second.tolist()
+        [1.0, 1.0, 1.0]
+    """
 
     first: Array
     second: Array
@@ -54,7 +59,12 @@ class Parameters(NamedTuple):
 
 @dataclass(frozen=True)
 class Limits:
-    """Hard limits of a law's parameters."""
+    """Hard limits of a law's parameters.
+
+    Example:
+        >>> Limits(log_std_max=0.0).concentration_max
+        80.0
+    """
 
     log_std_min: float = -10.0
     """Lower clip of log σ."""

@@ -95,6 +95,14 @@ def loss(networks: ActorCritic, rollout: Rollout, advantage: Tensor, entropy_coe
 
     Returns:
         For each seed a mean over its rollout, summed over seeds.
+
+    Example:
+        >>> import torch
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
+        >>> rollout = trainer.collector.collect(8)
+        >>> loss(trainer.networks, rollout, torch.ones(2, 8), entropy_coef=0.0).requires_grad
+        True
     """
     policy = networks.policy
     parameters = networks.parameters(rollout.obs)
@@ -122,6 +130,15 @@ def update(
 
     Returns:
         The diagnostics `[S]` of `diagnose`.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="policy-gradient", seeds=2))
+        >>> shuffles = [stream.shuffle for stream in trainer.streams]
+        >>> rollout = trainer.collector.collect(64)
+        >>> found = update(trainer.networks, trainer.optimizer, rollout, shuffles, trainer.config.algorithm)
+        >>> found["kl"].shape
+        torch.Size([2])
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage

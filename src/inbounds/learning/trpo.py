@@ -161,7 +161,7 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
 
 
 def damped(product: Product, damping: float) -> Product:
-    """Return v ↦ F v + damping · v."""
+    """Return v ↦ F v + damping · v, for `conjugate_gradient`, which has an example."""
     return lambda v: product(v) + damping * v
 
 
@@ -334,6 +334,7 @@ def update(
 
     Returns:
         Diagnostics `[S]`: those of `diagnose`, `accepted` (1 or 0) and `step_fraction` of the line search.
+        (`inbounds.learning.policy_gradient.update`, which is called alike, has an example.)
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage

@@ -33,7 +33,12 @@ ENDPOINTS: Mapping[str, str] = MappingProxyType(
 
 
 class Contrast(NamedTuple):
-    """First minus second, within an algorithm and an arm."""
+    """First minus second, within an algorithm and an arm.
+
+    Example:
+        >>> Contrast("standard", "ppo", "beta", "gaussian").columns[0].family
+        'beta'
+    """
 
     arm: str
     algorithm: str
@@ -85,6 +90,12 @@ def scores(outcome: Outcome, endpoint: str, *, without_diverged: bool = False) -
 
     Raises:
         ValueError: there is no such endpoint.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> scores(outcomes.finished["standard-hopper-ppo-beta"], "final").shape
+        (10,)
     """
     if endpoint == "final":
         values = statistics.final_score(outcome.returns)
@@ -98,7 +109,15 @@ def scores(outcome: Outcome, endpoint: str, *, without_diverged: bool = False) -
 
 
 def curve(outcome: Outcome) -> Estimate | None:
-    """Return a cell's learning curve `[E]`: mean over seeds, with a band that holds at each epoch by itself."""
+    """Return a cell's learning curve `[E]`: mean over seeds, with a band that holds at each epoch by itself.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> band = curve(outcomes.finished["standard-hopper-ppo-beta"])
+        >>> band.value.shape, bool((band.low < band.high).all())
+        ((500,), True)
+    """
     if _countable(outcome.returns[:, 0]) < 2:
         return None
     estimate = statistics.learning_curve(
@@ -110,7 +129,15 @@ def curve(outcome: Outcome) -> Estimate | None:
 def estimate(
     outcome: Outcome, endpoint: str, statistic: StatisticName = "mean", *, without_diverged: bool = False
 ) -> Estimate | None:
-    """Return mean or IQM of an endpoint over the seeds of a cell; None where fewer than two seeds have one."""
+    """Return mean or IQM of an endpoint over the seeds of a cell; None where fewer than two seeds have one.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> final = estimate(outcomes.finished["standard-hopper-ppo-beta"], "final")
+        >>> final.n, bool(final.low < final.value < final.high)
+        (10, True)
+    """
     values = scores(outcome, endpoint, without_diverged=without_diverged)
     if _countable(values) < 2:
         return None
@@ -120,7 +147,14 @@ def estimate(
 
 
 def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
-    """Return the mean return of a cell's final policies under each way to act; empty where they were not kept."""
+    """Return the mean return of a cell's final policies under each way to act; empty where they were not kept.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> sorted(by_way(outcomes.finished["standard-hopper-ppo-beta"]))
+        ['mean', 'median', 'mode', 'sample']
+    """
     return {
         way: statistics.bootstrap(
             values, generator_for("way", outcome.cell.id, way), statistic="mean", missing="exclude"
@@ -144,6 +178,13 @@ def differences(
 
     Returns:
         A comparison for each of the six robots; where a cell is missing, one without a difference.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> row = differences(outcomes, Contrast("standard", "ppo", "beta", "gaussian"), "final")["HalfCheetah"]
+        >>> bool(row.difference.low > 0), row.p_adjusted < 0.05
+        (True, True)
     """
     first, second = (_scores_by_robot(outcomes, c, endpoint, without_diverged) for c in contrast.columns)
     rng = generator_for("difference", *contrast, endpoint, without_diverged)
@@ -158,7 +199,15 @@ def differences(
 
 
 def change(outcomes: Outcomes, outcome: Outcome, endpoint: str) -> Estimate | None:
-    """Return how far a cell of the fourth arm is from its cell of comparison, in means; None where that is missing."""
+    """Return how far a cell of the fourth arm is from its cell of comparison, in means; None where that is missing.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> plain = outcomes.finished["standard-hopper-ppo-beta"]
+        >>> change(outcomes, plain, "final").value.item()  # of a cell from itself
+        0.0
+    """
     cell = outcome.cell
     plain = outcomes.find(Column(cell.arm, cell.algorithm, cell.family, cell.variant).baseline, cell.robot)
     if plain is None or min(_countable(scores(o, endpoint)) for o in (outcome, plain)) < 2:
@@ -177,6 +226,13 @@ def references(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
     """Return by robot the returns that become 0 and 1; without the robots where that cell is missing.
 
     Where the second does not exceed the first, no score can be normalised: see `normalized`.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> untrained, trained = references(outcomes)["HalfCheetah"]
+        >>> untrained < 0 < trained
+        True
     """
     cells = {robot: outcomes.find(REFERENCE, robot) for robot in ROBOTS}
     return {
@@ -192,6 +248,12 @@ def normalized(
     """Return a column's normalised scores `[S]` by robot, None unless it is complete on all six.
 
     A robot whose references are not in order is left out, as the protocol says.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> normalized(outcomes, REFERENCE, "final")["Hopper"].mean().round(6).item()
+        1.0
     """
     known = references(outcomes)
     raw = _scores_by_robot(outcomes, column, endpoint, without_diverged)
@@ -207,7 +269,14 @@ def normalized(
 def aggregate(
     outcomes: Outcomes, column: Column, endpoint: str, *, without_diverged: bool = False
 ) -> Estimate | None:
-    """Return the IQM of a column's normalised scores over all robots, None unless it is complete."""
+    """Return the IQM of a column's normalised scores over all robots, None unless it is complete.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> bool(aggregate(outcomes, Column("standard", "ppo", "beta"), "final").low > 1)
+        True
+    """
     found = normalized(outcomes, column, endpoint, without_diverged=without_diverged)
     if not found:
         return None
@@ -218,7 +287,15 @@ def aggregate(
 def improvement(
     outcomes: Outcomes, contrast: Contrast, endpoint: str, *, without_diverged: bool = False
 ) -> Estimate | None:
-    """Return the probability of improvement of first over second, None unless both are complete on all six robots."""
+    """Return the probability of improvement of first over second, None unless both are complete on all six robots.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> better = improvement(outcomes, Contrast("standard", "ppo", "beta", "gaussian"), "final")
+        >>> bool(better.low > 0.5)
+        True
+    """
     first, second = (
         _scores_by_robot(outcomes, column, endpoint, without_diverged) for column in contrast.columns
     )
@@ -229,7 +306,15 @@ def improvement(
 
 
 def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: ArrayLike) -> Profile | None:
-    """Return the performance profile of a column's normalised scores, None unless it is complete."""
+    """Return the performance profile of a column's normalised scores, None unless it is complete.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> shares = profile(outcomes, Column("standard", "ppo", "beta"), "final", [0.0, 1.0]).share
+        >>> bool(shares.value[0] > shares.value[1])
+        True
+    """
     found = normalized(outcomes, column, endpoint)
     if not found:
         return None

@@ -198,7 +198,12 @@ ARMS: Mapping[str, tuple[Cell, ...]] = MappingProxyType(
 
 
 def study_cells() -> tuple[Cell, ...]:
-    """Return all cells of the study, in the order in which they run."""
+    """Return all cells of the study, in the order in which they run.
+
+    Example:
+        >>> len(study_cells())
+        136
+    """
     return tuple(cell for cells in ARMS.values() for cell in cells)
 
 

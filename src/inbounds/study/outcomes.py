@@ -26,7 +26,12 @@ Floats = NDArray[np.float64]
 
 
 class Column(NamedTuple):
-    """What is the same on every robot: a column of the protocol's tables."""
+    """What is the same on every robot: a column of the protocol's tables.
+
+    Example:
+        >>> Column("mechanisms", "ppo", "beta", "entropy-0").baseline
+        Column(arm='standard', algorithm='ppo', family='beta', variant='')
+    """
 
     arm: str
     algorithm: str
@@ -141,6 +146,13 @@ class Outcomes:
         return cls(finished, states, folder)
 
     def find(self, column: Column, robot: str) -> Outcome | None:
-        """Return a column's cell on a robot, None where it is not finished."""
+        """Return a column's cell on a robot, None where it is not finished.
+
+        Example:
+            >>> from inbounds.study.store import StudyFolder
+            >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+            >>> outcomes.find(Column("standard", "ppo", "beta"), "Hopper").returns.shape
+            (10, 500)
+        """
         parts = (column.arm, robot.lower(), column.algorithm, column.family, column.variant)
         return self.finished.get("-".join(part for part in parts if part))

@@ -104,6 +104,12 @@ def run_study(
 
     Returns:
         What became of each cell.
+
+    Example:
+        >>> from inbounds.study import select
+        >>> summary = run_study(select(["standard-hopper-ppo-beta"]), StudyFolder())  # in the project's folder
+        >>> summary.reports["standard-hopper-ppo-beta"].outcome
+        'was finished'
     """
     settings = settings or Settings()
     with progress or StudyProgress(cells, folder) as shown:

@@ -85,6 +85,12 @@ class StudyFolder:
     Args:
         results: what is shared and published.
         work: claims and checkpoints; several machines that work together must share it too.
+
+    Example:
+        >>> from inbounds.study.grid import select
+        >>> cell, = select(["standard-hopper-ppo-beta"])
+        >>> StudyFolder().cell_file(cell).as_posix(), StudyFolder().state(cell)  # in the project's folder
+        ('results/cells/standard-hopper-ppo-beta.parquet', 'finished')
     """
 
     results: Path = Path("results")
@@ -240,6 +246,10 @@ def read_cell(path: str | Path) -> pa.Table:
     Raises:
         FileNotFoundError: there is no such file.
         DamagedFileError: it is damaged.
+
+    Example:
+        >>> read_cell("results/cells/standard-hopper-ppo-beta.parquet").num_rows  # 500 epochs of ten seeds
+        5000
     """
     try:
         return pq.read_table(path, page_checksum_verification=True)

@@ -64,6 +64,12 @@ def verify(
 
     Returns:
         The findings, bad ones included.
+
+    Example:
+        >>> from inbounds.study import StudyFolder, select
+        >>> findings = verify(select(["standard-hopper-ppo-beta"]), StudyFolder(), rerun=())
+        >>> all(finding.ok for finding in findings)
+        True
     """
     findings: list[Finding] = []
 

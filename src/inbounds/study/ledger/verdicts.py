@@ -231,6 +231,13 @@ def judge(outcomes: Outcomes, claim: Claim) -> Finding:
     Args:
         outcomes: what there is of the study.
         claim: which.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> from inbounds.study.ledger import claims_named
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> judge(outcomes, *claims_named(["wins-beta-standard"])).verdict
+        'supported'
     """
     behind = select(claim.cells) if claim.cells else ()
     finished = sum(cell.id in outcomes.finished for cell in behind)
