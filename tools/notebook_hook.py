@@ -7,12 +7,15 @@ Pictures and videos are made by the build. What stays is the text form of each o
 """
 
 import argparse
+import re
 import sys
 from pathlib import Path
 
 import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
+QUOTED = re.compile(r"\{glue:?\w*\}`([^`:]+)")
+"""The name in a glue role of MyST."""
 LIGHT = ("text/plain", "application/papermill.record/text/plain")
 METADATA = {
     "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
@@ -34,7 +37,7 @@ def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 def complaints(notebook: nbformat.NotebookNode) -> list[str]:
     """What keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
-    found, expected = [], 1
+    found, expected = unknown_values(notebook), 1
     for number, cell in enumerate(notebook.cells):
         if cell.cell_type != "code" or not cell.source.strip():
             continue
@@ -51,6 +54,23 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
             if output.get("name") == "stderr":
                 found.append(f"cell {number}: wrote to stderr: {output.text.strip()[:80]}")
     return found
+
+
+def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
+    """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
+    glued = {
+        output.metadata["scrapbook"]["name"]
+        for cell in notebook.cells
+        for output in cell.get("outputs", [])
+        if "scrapbook" in output.get("metadata", {})
+    }
+    return [
+        f"cell {number}: quotes {name!r}, which no cell glues"
+        for number, cell in enumerate(notebook.cells)
+        if cell.cell_type == "markdown"
+        for name in QUOTED.findall(cell.source)
+        if name not in glued
+    ]
 
 
 def main() -> int:

@@ -214,6 +214,12 @@ def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
             ),
             "stores pictures",
         ),
+        (
+            lambda cell: (
+                cell.clear() or cell.update(nbformat.v4.new_markdown_cell("{glue:text}`answer:.0f`"))
+            ),
+            "quotes 'answer', which no cell glues",
+        ),
     ],
 )
 def test_the_hook_sees(tmp_path: Path, plant, complaint: str) -> None:
