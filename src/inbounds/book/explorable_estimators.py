@@ -45,6 +45,8 @@ class OneStep:
     The moments are those of one sample of (reward - share · mean reward) times a score, by Gauss–Legendre quadrature
     on the three pieces of the real line; the scores are autograd's, of the Normal and of
     `ClippedNormal`.
+
+    Its `moments` has an example.
     """
 
     mu: float

@@ -42,7 +42,10 @@ _MU, _LOG_SIGMA = (-4.0, 4.0), (-3.0, 1.0)
 
 @dataclass(frozen=True)
 class GreedyActions:
-    """Mean, median and mode of the action tanh(z/2) for a latent z ~ N(μ, σ²)."""
+    """Mean, median and mode of the action tanh(z/2) for a latent z ~ N(μ, σ²).
+
+    Its `actions` has an example.
+    """
 
     mu: float
     """μ, location of the latent."""

@@ -46,6 +46,8 @@ class TwoPolicies:
 
     As drawn, the action is the latent z itself; squashed it is tanh(z/2), a logit-normal on [-1, 1]; clipped it is
     min(max(z, -1), 1).
+
+    Its `kl` has an example.
     """
 
     old: Pair

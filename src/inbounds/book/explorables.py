@@ -43,6 +43,10 @@ class MatchedLaws:
     μ, and a Gaussian is left: N(m, s²) with m = tanh(μ/2), the logit-normal's median, and s = σ(1 - m²)/2, σ times the
     squash's slope there. As σ → 0 the two agree; as σ grows, the tangent leaves the box where the squash bends, and
     the simulator clips it. The Beta has the mean and standard deviation of the logit-normal's actions.
+
+    Example:
+        >>> MatchedLaws(mu=0.0, sigma=1.0).logit_normal
+        LogitNormal(loc: 0.0, scale: 1.0, low: -1.0, high: 1.0)
     """
 
     mu: float

@@ -63,7 +63,12 @@ MAX_DENSITY = 4.0
 
 @dataclass(frozen=True)
 class FamilyStyle:
-    """The look of one policy family, the same throughout the book."""
+    """The look of one policy family, the same throughout the book.
+
+    Example:
+        >>> FAMILIES["beta"].label
+        'Beta'
+    """
 
     label: str
     """Name in legends."""

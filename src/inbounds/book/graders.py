@@ -21,7 +21,10 @@ from inbounds.distributions import LogitNormal
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a grader found."""
+    """What a grader found.
+
+    Made by `judge`, which has an example.
+    """
 
     exercise: str
     """Name of the reader's function."""
@@ -45,7 +48,10 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Case:
-    """One call of the reader's function, what it should return, and what known mistakes would return."""
+    """One call of the reader's function, what it should return, and what known mistakes would return.
+
+    Judged by `judge`, which has an example.
+    """
 
     arguments: tuple[Any, ...]
     expected: Any

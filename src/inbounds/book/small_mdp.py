@@ -31,7 +31,13 @@ _RULE = quadrature.trapezoid(101)
 
 
 class Episodes(NamedTuple):
-    """E episodes, padded to T steps with zeros; arrays `[E, T]`, or `[..., E, T]` for a batch of policies."""
+    """E episodes, padded to T steps with zeros; arrays `[E, T]`, or `[..., E, T]` for a batch of policies.
+
+    Example:
+        >>> episodes = ledge().sample(lambda cell: (0.0 * cell, 0.0 * cell), (2,), 50, np.random.default_rng(0))
+        >>> episodes.reward.shape, bool(episodes.alive[:, 0].all())
+        ((2, 50), True)
+    """
 
     state: NDArray[np.int64]
     """The cell before the step."""

@@ -45,7 +45,10 @@ SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "lo
 
 @dataclass(frozen=True)
 class Curve:
-    """A learning curve over seeds."""
+    """A learning curve over seeds.
+
+    Drawn by `learning_curves`, which has an example.
+    """
 
     steps: NDArray[np.float64]
     """`[E]` environment steps of each seed at the end of each epoch."""

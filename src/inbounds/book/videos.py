@@ -39,6 +39,8 @@ class Video:
         width: in pixels.
         height: in pixels.
         seconds: duration.
+
+    Part of what `show_films` returns, which has an example.
     """
 
     title: str
@@ -68,6 +70,8 @@ class VideoRow:
 
     Attributes:
         videos: the encoded videos, in order.
+
+    Made by `show_films`, which has an example.
     """
 
     def __init__(self, videos: list[Video]) -> None:

@@ -70,6 +70,11 @@ class BoundedDistribution(Distribution):
     Raises:
         ValueError: shapes that do not broadcast; under validation also a parameter outside its constraint, bounds
             that are infinite, NaN or out of order, or that leave no floating-point number between them.
+
+    Example:
+        >>> from inbounds.distributions import LogitNormal, ScaledBeta
+        >>> all(issubclass(law, BoundedDistribution) for law in (LogitNormal, ScaledBeta))
+        True
     """
 
     low: Tensor

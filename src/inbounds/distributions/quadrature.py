@@ -39,6 +39,8 @@ class Rule(NamedTuple):
     Args:
         nodes: `[..., N]` standardised nodes x_i.
         weights: `[..., N]` weights w_i; they sum to one up to the rule's error.
+
+    Made by `gauss_hermite`, which has an example.
     """
 
     nodes: Tensor

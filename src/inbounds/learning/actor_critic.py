@@ -19,7 +19,12 @@ DTYPES = {"float32": torch.float32, "float64": torch.float64}
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Shape and first weights of the policy and the value network, which share nothing."""
+    """Shape and first weights of the policy and the value network, which share nothing.
+
+    Example:
+        >>> NetworkConfig(hidden_sizes=(256, 256)).initialization
+        'orthogonal'
+    """
 
     hidden_sizes: tuple[int, ...] = (64, 64)
     """Units of the hidden layers, tanh between them."""

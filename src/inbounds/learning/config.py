@@ -28,7 +28,13 @@ ALGORITHMS: dict[str, tuple[type[AlgorithmConfig], ModuleType]] = {
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """Everything that decides what a run does. Two runs with one configuration are the same run, bit for bit."""
+    """Everything that decides what a run does. Two runs with one configuration are the same run, bit for bit.
+
+    Example:
+        >>> config = TrainConfig("Hopper-v5", seeds=(0, 1), algorithm=TRPOConfig(max_kl=0.02))
+        >>> config.algorithm_name, config.policy.family, config.epochs
+        ('trpo', 'logit-normal', 500)
+    """
 
     env: str = "HalfCheetah-v5"
     """One of the robots of `inbounds.robots`, or any id that `gymnasium.make` knows."""

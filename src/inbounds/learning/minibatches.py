@@ -14,7 +14,16 @@ from inbounds.learning.rollout import Rollout
 
 
 class Minibatch(NamedTuple):
-    """B steps of each of S seeds."""
+    """B steps of each of S seeds.
+
+    Example:
+        >>> from inbounds.learning import Trainer, preset
+        >>> rollout = Trainer(preset("common", "Hopper-v5", seeds=2)).collector.collect(64)
+        >>> shuffles = [np.random.default_rng(seed) for seed in (0, 1)]
+        >>> advantage, return_ = rollout.advantages(gamma=0.99, gae_lambda=0.95)
+        >>> [tuple(batch.obs.shape) for batch in minibatches(rollout, advantage, return_, 32, shuffles)]
+        [(2, 32, 11), (2, 32, 11)]
+    """
 
     obs: Tensor
     """`[S, B, O]`."""

@@ -26,7 +26,12 @@ from inbounds.learning.value import fit_values
 
 @dataclass(frozen=True)
 class PolicyGradientConfig:
-    """Every number of REINFORCE with a baseline; the defaults are those of the preset `common`."""
+    """Every number of REINFORCE with a baseline; the defaults are those of the preset `common`.
+
+    Example:
+        >>> PolicyGradientConfig(gae_lambda=0.95).policy_learning_rate
+        0.003
+    """
 
     horizon: int = 2048
     """T, env steps per seed and epoch."""
@@ -60,7 +65,10 @@ class PolicyGradientConfig:
 
 @dataclass
 class Optimizers:
-    """One Adam for the policy, one for the value network."""
+    """One Adam for the policy, one for the value network.
+
+    Used by `update`, which has an example.
+    """
 
     actor: SeedAdam
     critic: SeedAdam

@@ -29,7 +29,15 @@ from inbounds.learning.rollout import Rollout
 
 @dataclass(frozen=True)
 class PPOConfig:
-    """Every number of PPO; the defaults are those of the preset `common`."""
+    """Every number of PPO; the defaults are those of the preset `common`.
+
+    Example:
+        >>> PPOConfig(horizon=1024).minibatch_size
+        64
+        >>> PPOConfig(clip_range=0.0)
+        Traceback (most recent call last):
+        ValueError: clip_range must be positive, got 0.0
+    """
 
     horizon: int = 2048
     """T, env steps per seed and epoch."""

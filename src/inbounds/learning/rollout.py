@@ -30,7 +30,10 @@ ActionMode = Literal["clip", "raw"]
 
 @dataclass(frozen=True)
 class Rollout:
-    """T steps of S seeds."""
+    """T steps of S seeds.
+
+    Drawn by `Collector`, which has an example.
+    """
 
     obs: Tensor
     """`[S, T, O]` as the networks saw it (normalised, if the run normalises)."""

@@ -42,7 +42,7 @@ _CACHED = 512
 
 @dataclass(frozen=True)
 class TRPOConfig:
-    """Every number of TRPO; the defaults are those of the preset `common`."""
+    """Every number of TRPO; the defaults are those of the preset `common`. `TrainConfig` has an example."""
 
     horizon: int = 2048
     """T, env steps per seed and epoch."""
@@ -231,7 +231,7 @@ def surrogate(
 
 
 class LineSearch(NamedTuple):
-    """What became of each seed's step, `[S]` each."""
+    """What became of each seed's step, `[S]` each; `line_search`, which makes it, has an example."""
 
     accepted: Tensor
     """Booleans: some length satisfied both conditions."""

@@ -66,6 +66,12 @@ class Ant(ContactTask):
     start         reference pose; positions ± U(0.1), velocities 0.1 · N(0, 1)           as above
     step          0.05 s: 5 physics steps of 0.01 s                                      s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("Ant-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 105), (2, 8), 1.0)
     """
 
     name = "Ant-v5"
@@ -128,6 +134,12 @@ class Humanoid(ContactTask):
     start         reference pose; positions and velocities ± U(0.01)                     as above
     step          0.015 s: 5 physics steps of 0.003 s                                    s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("Humanoid-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 348), (2, 17), 0.4)
     """
 
     name = "Humanoid-v5"

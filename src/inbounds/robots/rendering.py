@@ -50,6 +50,8 @@ class Film:
         frames: ``[T, height, width, 3]``, 8-bit RGB.
         fps: frames per second of simulated time.
         total_reward: sum of the rewards collected while the film was made.
+
+    Made by `record`, which has an example.
     """
 
     frames: Frame

@@ -157,6 +157,12 @@ class HalfCheetah(Task):
     start         reference pose; positions ± U(0.1), velocities 0.1 · N(0, 1)           as above
     step          0.05 s: 5 physics steps of 0.01 s                                      s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("HalfCheetah-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 17), (2, 6), 1.0)
     """
 
     name = "HalfCheetah-v5"
@@ -185,6 +191,12 @@ class Swimmer(Task):
     start         reference pose; positions and velocities ± U(0.1)                      as above
     step          0.04 s: 4 physics steps of 0.01 s                                      s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("Swimmer-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 8), (2, 2), 1.0)
     """
 
     name = "Swimmer-v5"
@@ -219,6 +231,12 @@ class Hopper(Task):
     start         reference pose; positions and velocities ± U(0.005)                    as above
     step          0.008 s: 4 physics steps of 0.002 s                                    s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("Hopper-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 11), (2, 3), 1.0)
     """
 
     name = "Hopper-v5"
@@ -262,6 +280,12 @@ class Walker2d(Hopper):
     start         reference pose; positions and velocities ± U(0.005)                    as above
     step          0.008 s: 4 physics steps of 0.002 s                                    s
     ============  =====================================================================  ==========
+
+    Example:
+        >>> from inbounds.robots import make
+        >>> envs = make("Walker2d-v5", num_envs=2)
+        >>> envs.observation_space.shape, envs.action_space.shape, round(float(envs.action_space.high[0, 0]), 1)
+        ((2, 17), (2, 6), 1.0)
     """
 
     name = "Walker2d-v5"

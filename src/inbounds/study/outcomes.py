@@ -53,7 +53,14 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a finished cell left."""
+    """What a finished cell left.
+
+    Example:
+        >>> from inbounds.study.store import StudyFolder
+        >>> outcome = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
+        >>> outcome.returns.shape, outcome.cell.robot
+        ((10, 500), 'Hopper')
+    """
 
     cell: Cell
     """Which."""
@@ -116,7 +123,14 @@ def _ways(returns: pa.Table, seeds: int) -> dict[str, Floats]:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What there is of a study."""
+    """What there is of a study.
+
+    Example:
+        >>> from inbounds.study.store import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> outcomes.states["standard-hopper-ppo-beta"]
+        'finished'
+    """
 
     finished: Mapping[str, Outcome]
     """By the cell's id."""

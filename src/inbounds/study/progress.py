@@ -27,6 +27,8 @@ class StudyProgress:
         cells: of the run.
         folder: where their claims are, which say how far they are.
         console: where to write; by default standard output.
+
+    Shown by `run_study`, which has an example.
     """
 
     def __init__(self, cells: Sequence[Cell], folder: StudyFolder, console: Console | None = None) -> None:

@@ -43,7 +43,12 @@ LOOK_EVERY = 1.0  # seconds between looks at running cells
 
 @dataclass(frozen=True)
 class Settings:
-    """How to run cells; nothing here changes a result."""
+    """How to run cells; nothing here changes a result.
+
+    Example:
+        >>> Settings(jobs=2, nice=19, max_minutes=60).scheduler is None  # two processes on this machine, for an hour
+        True
+    """
 
     jobs: int | None = None
     """Processes at a time; None is one per core that this process may use."""
@@ -64,7 +69,10 @@ class Settings:
 
 
 class Report(NamedTuple):
-    """What became of a cell."""
+    """What became of a cell.
+
+    Part of what `run_study` returns, which has an example.
+    """
 
     outcome: str
     """finished, was finished, stopped, claimed, failed, disk full or died."""
@@ -73,7 +81,10 @@ class Report(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What became of a run."""
+    """What became of a run.
+
+    Made by `run_study`, which has an example.
+    """
 
     reports: dict[str, Report]
     """By the cell's id; cells that were not started are not in it."""

@@ -35,7 +35,10 @@ NOTHING_TO_RERUN = "skipped: none of its cells is finished"
 
 
 class Finding(NamedTuple):
-    """What a check found."""
+    """What a check found.
+
+    Made by `verify`, which has an example.
+    """
 
     subject: str
     """A file or a cell."""

@@ -79,6 +79,8 @@ class Explorable:
 
     Displays itself in a notebook and in the built book. Its plain text is fixed, and so is its HTML (ids included),
     so that two builds of the book are the same.
+
+    Made by `bounded_densities`, which has an example.
     """
 
     name: str

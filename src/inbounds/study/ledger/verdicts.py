@@ -48,7 +48,10 @@ STAYS = "stays undecided"
 
 @dataclass(frozen=True)
 class Statement:
-    """One of the things that a claim says, as a number."""
+    """One of the things that a claim says, as a number.
+
+    Part of what `judge` returns, which has an example.
+    """
 
     about: str
     """What of: "Hopper", "Ant, logit-normal − gaussian"."""
@@ -93,7 +96,10 @@ Evidence: TypeAlias = Callable[[Outcomes], Sequence[Statement]]
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim and its test."""
+    """A claim and its test.
+
+    Found by `claims_named` and judged by `judge`, which has an example.
+    """
 
     id: str
     """Names it on the command line."""
@@ -129,7 +135,10 @@ class Claim:
 
 @dataclass(frozen=True)
 class Finding:
-    """What there is to a claim."""
+    """What there is to a claim.
+
+    Made by `judge`, which has an example.
+    """
 
     claim: Claim
     """Which."""

@@ -184,7 +184,10 @@ def _newcombe(value: float, m: int, n: int, level: float) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class Profile:
-    """A performance profile."""
+    """A performance profile.
+
+    Made by `performance_profile`, which has an example.
+    """
 
     thresholds: Floats
     """`[K]` normalised scores τ."""

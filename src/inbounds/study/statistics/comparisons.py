@@ -213,7 +213,10 @@ def holm(p_values: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two policies on one environment; NaN and None where a cell is missing."""
+    """Two policies on one environment; NaN and None where a cell is missing.
+
+    Made by `compare`, which has an example.
+    """
 
     difference: Estimate | None
     """First minus second, or None: a cell is missing."""

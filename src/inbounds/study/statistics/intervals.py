@@ -58,7 +58,10 @@ _CHUNK = 4_000_000  # numbers resampled at once: 32 MB
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number, or an array of numbers, with its interval."""
+    """A number, or an array of numbers, with its interval.
+
+    Made by `bootstrap`, which has an example.
+    """
 
     value: Floats
     """`[...]` the statistic of the seeds that count."""

@@ -14,7 +14,10 @@ from inbounds.study.statistics.seeds import Missing
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Outcome of two one-sided tests."""
+    """Outcome of two one-sided tests.
+
+    Made by `equivalence`, which has an example.
+    """
 
     difference: float
     """Difference of the means."""
