@@ -8,7 +8,8 @@ import pytest
 
 from inbounds.learning import preset, stored_config
 from inbounds.learning.stored_config import describe
-from inbounds.study.grid import ARMS, ROBOTS, VARIANTS, Cell, select, study_cells
+from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, VARIANTS, Cell, all_cells, select, study_cells
+from inbounds.study.ledger import CLAIMS
 from inbounds.study.statistics import settings
 
 PROTOCOL = Path(__file__).parents[2] / "results" / "PROTOCOL.md"
@@ -29,6 +30,18 @@ def test_the_arms_are_those_of_the_protocol() -> None:
     rows = re.findall(r"^\| \d (\w+) \|.*\| (\d+) \|$", PROTOCOL.read_text(), re.MULTILINE)
     assert {name: int(count) for name, count in rows} == {arm: len(cells) for arm, cells in ARMS.items()}
     assert [name for name, _ in rows] == list(ARMS)
+
+
+def test_cells_of_later_are_told_apart_from_the_protocols() -> None:
+    assert all_cells() == (*study_cells(), *AFTERWARDS)
+    assert {cell.arm for cell in AFTERWARDS}.isdisjoint(ARMS)
+    assert select() == study_cells()
+    assert select(["afterwards"]) == AFTERWARDS
+    assert not any(set(AFTERWARDS) & set(select(claim.cells)) for claim in CLAIMS if claim.cells)
+    said = (PROTOCOL.parent / "AFTERWARDS.md").read_text(encoding="utf8")
+    for cell in AFTERWARDS:
+        assert f"{cell.algorithm.upper()} × {cell.family} on {cell.robot}" in said
+        assert f"`{cell.variant}`" in said
 
 
 def test_the_variants_are_those_of_the_protocol() -> None:
@@ -58,7 +71,7 @@ def test_the_numbers_of_the_analysis_are_those_of_the_protocol() -> None:
 
 
 def test_ids_and_digests_are_unique_but_for_nothing() -> None:
-    cells = study_cells()
+    cells = all_cells()
     assert max(Counter(cell.id for cell in cells).values()) == 1
     assert max(Counter(cell.digest for cell in cells).values()) == 1
     assert all(re.fullmatch(r"[a-z0-9.-]+", cell.id) for cell in cells)
@@ -71,11 +84,11 @@ def test_one_robot_after_another(arm: str) -> None:
 
 
 def test_every_cell_has_the_full_length() -> None:
-    for cell in study_cells():
+    for cell in all_cells():
         assert cell.config.epochs == 500
         assert cell.config.algorithm.horizon == 2048
         assert cell.config.seeds == tuple(range(10))
-        assert cell.keeps_policies == (cell.arm == "standard")
+        assert cell.keeps_policies == (cell.arm in ("standard", "afterwards"))
 
 
 def test_an_option_that_came_later_had_its_default() -> None:
@@ -109,7 +122,7 @@ def test_a_variant_changes_one_thing(variant: str) -> None:
         "printed-gradients": "algorithm.max_grad_norm",
         "printed-weights": "network.initialization",
     }.get(variant, "algorithm.entropy_coef")
-    for cell in [cell for cell in ARMS["mechanisms"] if cell.variant == variant]:
+    for cell in [cell for cell in all_cells() if cell.variant == variant]:
         plain = Cell("standard", cell.algorithm, cell.family, cell.robot)
         assert differences(cell, plain) == {changed}
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from tyro.conf import Positional, arg, subcommand
 
 from inbounds.study.cell_run import StudyError
-from inbounds.study.grid import Cell, select
+from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.progress import StudyProgress, cell_status, status_table
@@ -27,7 +27,8 @@ Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...
 @dataclass(frozen=True)
 class _Where:
     cells: Cells = ()
-    """Which: arms (standard, printed, beyond, mechanisms), ids, or patterns like '*-hopper-ppo-*'; by default all."""
+    """Which: arms (standard, printed, beyond, mechanisms; afterwards, outside the protocol), ids, or patterns like
+    '*-hopper-ppo-*'; by default all of the protocol (status and verify: all)."""
     results: Path = StudyFolder.results
     """Folder of the results."""
     work: Path = StudyFolder.work
@@ -47,6 +48,13 @@ class _Where:
 
 
 @dataclass(frozen=True)
+class _WhereAll(_Where):
+    def chosen(self) -> tuple[Cell, ...]:
+        """Return the cells; without a pattern those outside the protocol, too."""
+        return super().chosen() if self.cells else all_cells()
+
+
+@dataclass(frozen=True)
 class Run(_Where):
     """Run cells, in the study's order; finished ones stay, begun ones go on. Several of it may share a folder."""
 
@@ -59,7 +67,7 @@ class Resume(Run):
 
 
 @dataclass(frozen=True)
-class Status(_Where):
+class Status(_WhereAll):
     """Show how far the study is."""
 
     each: bool = False
@@ -87,7 +95,7 @@ class Ledger:
 
 
 @dataclass(frozen=True)
-class Verify(_Where):
+class Verify(_WhereAll):
     """Check the sums of all results, and run the first epochs of some cells again."""
 
     epochs: int = 2

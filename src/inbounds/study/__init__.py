@@ -1,7 +1,7 @@
 """The experiment: a declarative grid of cells, run and resumed on one machine or many, stored, verified."""
 
 from inbounds.study.cell_run import StudyError, run_cell
-from inbounds.study.grid import ARMS, STUDY_VERSION, Cell, select, study_cells
+from inbounds.study.grid import ARMS, STUDY_VERSION, Cell, all_cells, select, study_cells
 from inbounds.study.run import Settings, run_study
 from inbounds.study.store import StudyFolder, read_cell
 from inbounds.study.verify import verify
@@ -13,6 +13,7 @@ __all__ = [
     "Settings",
     "StudyError",
     "StudyFolder",
+    "all_cells",
     "read_cell",
     "run_cell",
     "run_study",

@@ -197,8 +197,21 @@ ARMS: Mapping[str, tuple[Cell, ...]] = MappingProxyType(
 """Arm → its cells, both in the order in which they run."""
 
 
+AFTERWARDS = tuple(
+    Cell("afterwards", algorithm, family, robot, "matched-noise", keeps_policies=True)
+    for algorithm, family, robot in (
+        ("trpo", "gaussian", "HalfCheetah"),
+        ("trpo", "logit-normal", "HalfCheetah"),
+        ("ppo", "gaussian", "Ant"),
+        ("trpo", "gaussian", "Ant"),
+        ("ppo", "gaussian", "Humanoid"),
+    )
+)
+"""Asked for after results had been seen, and outside the protocol: `results/AFTERWARDS.md` says when and why."""
+
+
 def study_cells() -> tuple[Cell, ...]:
-    """Return all cells of the study, in the order in which they run.
+    """Return all cells of the protocol, in the order in which they run.
 
     Example:
         >>> len(study_cells())
@@ -207,12 +220,22 @@ def study_cells() -> tuple[Cell, ...]:
     return tuple(cell for cells in ARMS.values() for cell in cells)
 
 
+def all_cells() -> tuple[Cell, ...]:
+    """Return the protocol's cells and those that were asked for afterwards.
+
+    Example:
+        >>> len(all_cells()) - len(study_cells())
+        5
+    """
+    return (*study_cells(), *AFTERWARDS)
+
+
 def select(patterns: Sequence[str] = (), cells: Sequence[Cell] | None = None) -> tuple[Cell, ...]:
     """Return the cells whose id matches one of some patterns, in the study's order.
 
     Args:
-        patterns: ids, arms, or patterns with * and ?; none of them selects all.
-        cells: to choose from; None is the whole study.
+        patterns: ids, arms, or patterns with * and ?; none of them selects all of the protocol.
+        cells: to choose from; None is the protocol's and those of `AFTERWARDS`.
 
     Raises:
         ValueError: a pattern matches nothing.
@@ -221,7 +244,8 @@ def select(patterns: Sequence[str] = (), cells: Sequence[Cell] | None = None) ->
         >>> [cell.id for cell in select(["*-ant-*-raw-cost"])], len(select(["beyond"]))
         (['mechanisms-ant-ppo-gaussian-raw-cost'], 18)
     """
-    cells = study_cells() if cells is None else tuple(cells)
+    if cells is None:
+        cells = all_cells() if patterns else study_cells()
     matches = {p: [c for c in cells if c.arm == p or fnmatch.fnmatchcase(c.id, p)] for p in patterns}
     if missed := [pattern for pattern, found in matches.items() if not found]:
         raise ValueError(
