@@ -91,7 +91,7 @@ def test_nothing_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "0 of 136 cells are finished" in capsys.readouterr().out
     page = Page(out.read_text(encoding="utf8"))
     assert page.images == []
-    assert len(page.missing) == 3 + 5 + 1  # arms, groups of the fourth, provenance
+    assert len(page.missing) == 3 + 5 + 1 + 1  # arms, groups of the fourth, cells of later, provenance
     assert page.table("Finished cells")[1] == ["Arm 1: standard practice", *["0 of 5"] * 6]
 
 
@@ -121,6 +121,7 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     write_cells(folder, [cell for cell in select(["standard-*-ppo-*"]) if cell not in odd])
     write_cells(folder, odd, diverged=(0, 4))
     write_cells(folder, select(["mechanisms-hopper-ppo-*-entropy-0", "beyond-hopper-trpo-beta"]))
+    write_cells(folder, select(["afterwards-ant-ppo-*", "afterwards-halfcheetah-trpo-gaussian-*"]))
     page, outcomes = report(folder, tmp_path), Outcomes.read(folder)
     gaps = analysis.differences(outcomes, Contrast("standard", "ppo", "logit-normal", "gaussian"), "greedy")
     row = next(
@@ -146,6 +147,13 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
         ["Hopper", "PPO", label, "entropy-0"] for label in ("Gaussian, clipped", "Beta", "Logit-normal")
     ]
     assert len(changes) == 1 + 18
+    later = page.table("Matched initial noise, asked afterwards: changed cell minus")
+    assert [line[:2] for line in later[1:] if line[4] != "missing"] == [
+        ["Ant", "PPO"]
+    ]  # TRPO: nothing to compare with
+    (found,) = outcomes.and_of(select(["afterwards-ant-ppo-*"])).finished.keys() - outcomes.finished.keys()
+    change = analysis.change(outcomes, outcomes.and_of(select([found])).finished[found], "final")
+    assert spoken(change) in next(line for line in later if line[0] == "Ant")
     assert len(page.table("Final policies by way to act")) == 1 + 18
     beyond = {row[1] for row in page.table("Endpoints (TRPO, beyond the thesis)")[1:]}
     assert beyond == {"Gaussian, clipped", "Clipped Gaussian (CAPG)", "Beta", "Logit-normal"}

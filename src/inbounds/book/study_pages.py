@@ -103,6 +103,11 @@ def changes(outcomes: Outcomes, word: str) -> Shown:
     )
 
 
+def afterwards(outcomes: Outcomes) -> Shown:
+    """Return what the cells outside the protocol change (`results/AFTERWARDS.md`)."""
+    return _shown("study: what changes, asked afterwards", study_report.afterwards(outcomes))
+
+
 def score_sheet(outcomes: Outcomes) -> Shown:
     """Return wins and losses after Holm, beside what the source thesis says."""
     return _shown("study: wins and losses", report_results.score_sheet(outcomes))

@@ -8,6 +8,7 @@ It works with no cell, with a few and with all of them: what is missing is calle
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from inbounds.book import report_page as html
@@ -19,7 +20,7 @@ from inbounds.book.study_figures import interval_panels
 from inbounds.learning.files import write_whole
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
-from inbounds.study.grid import ARMS, ROBOTS, STUDY_VERSION, Cell
+from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, STUDY_VERSION, Cell
 from inbounds.study.ledger import CLAIMS, judge
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate
@@ -57,8 +58,13 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
         ...     "Claims" in write_report(nothing, Path(folder) / "report.html").read_text()
         True
     """
-    sections = [("state", "What there is"), *TITLES.items(), ("claims", "Claims of the source thesis")]
-    sections.append(("provenance", "Provenance"))
+    sections = [
+        ("state", "What there is"),
+        *TITLES.items(),
+        ("afterwards", "Asked afterwards"),
+        ("claims", "Claims of the source thesis"),
+        ("provenance", "Provenance"),
+    ]
     parts = [
         html.paragraph(f"Study version {STUDY_VERSION}. {_count(outcomes)}"),
         html.contents(sections),
@@ -70,6 +76,12 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
     for arm in TITLES:
         parts += _mechanisms(outcomes) if arm == "mechanisms" else arm_section(outcomes, arm)
     parts += [
+        html.heading("Asked afterwards", 2, "afterwards"),
+        html.paragraph(
+            "Cells that the protocol does not have, added when results had been seen: exploratory. "
+            "results/AFTERWARDS.md says why each was added, and what was expected."
+        ),
+        *afterwards(outcomes),
         html.heading("Claims of the source thesis", 2, "claims"),
         *ledger_section([judge(outcomes, c) for c in CLAIMS]),
     ]
@@ -135,7 +147,15 @@ def changes(outcomes: Outcomes, word: str) -> list[str]:
     return _changes(outcomes, GROUPS[word], cells)
 
 
-def _changes(outcomes: Outcomes, title: str, cells: list[Cell]) -> list[str]:
+def afterwards(outcomes: Outcomes) -> list[str]:
+    """Return what the cells of `AFTERWARDS` change against those of arm 1, as a figure and a table."""
+    both = outcomes.and_of(AFTERWARDS)
+    if not any(cell.id in both.finished for cell in AFTERWARDS):
+        return [NONE_FINISHED]
+    return _changes(both, "Matched initial noise, asked afterwards", AFTERWARDS)
+
+
+def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
     panels: dict[str, dict[str, Estimate | None]] = {}
     rows = []
     for cell in cells:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -158,6 +159,24 @@ class Outcomes:
                     cell, store.read_cell(path), store.read_metadata(path), returns
                 )
         return cls(finished, states, folder)
+
+    def and_of(self, cells: Sequence[Cell]) -> Outcomes:
+        """Return these and what there is of more cells, from the same folder.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from inbounds.study.grid import AFTERWARDS
+            >>> from inbounds.study.store import StudyFolder
+            >>> outcomes = Outcomes.read(StudyFolder(Path("no/results")))
+            >>> len(outcomes.and_of(AFTERWARDS).states) - len(outcomes.states)
+            5
+        """
+        more = Outcomes.read(self.folder, cells)
+        return Outcomes(
+            MappingProxyType({**self.finished, **more.finished}),
+            MappingProxyType({**self.states, **more.states}),
+            self.folder,
+        )
 
     def find(self, column: Column, robot: str) -> Outcome | None:
         """Return a column's cell on a robot, None where it is not finished.
