@@ -31,6 +31,11 @@ def entropy(loc, scale, low, high):
     return LogitNormal(loc, scale, low, high).entropy().item()
 
 
+def colleagues_entropy(loc, scale, low, high):
+    """As the exercise prints it."""
+    return 0.5 * np.log(2 * np.pi * np.e * scale**2) + loc - 2 * np.log1p(np.exp(loc))
+
+
 RIGHT = {"mass_outside": stable, "log_prob_from_latent": log_prob, "entropy_by_quadrature": entropy}
 
 
@@ -85,6 +90,12 @@ def test_an_exception_is_reported(name: str) -> None:
         ("entropy_by_quadrature", lambda m, s, lo, hi: stats.norm.entropy(m, s), "Gaussian's entropy"),
         ("entropy_by_quadrature", lambda m, s, lo, hi: entropy(m, s, lo, hi) - math.log(hi - lo), "length"),
         ("entropy_by_quadrature", lambda *a: -entropy(*a), "sign"),
+        ("entropy_by_quadrature", colleagues_entropy, "both errors"),
+        (
+            "entropy_by_quadrature",
+            lambda m, s, lo, hi: colleagues_entropy(m, s, lo, hi) + math.log(hi - lo),
+            "average it over z",
+        ),
     ],
 )
 def test_known_mistakes_are_named(name: str, wrong: Callable, words: str) -> None:

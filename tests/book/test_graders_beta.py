@@ -42,6 +42,13 @@ def unbounded(mean, std, low, high, cap):
     return None if max(m * total, (1 - m) * total) > cap else (m * total, (1 - m) * total)
 
 
+def forgetting(mean, std, low, high, cap, alpha=True, beta=True, small_alpha=True, small_beta=True):
+    """Right, but for one of the four conditions."""
+    a, b = unbounded(mean, std, low, high, 1e9)
+    tests = (alpha and a > cap, beta and b > cap, small_alpha and a < 1, small_beta and b < 1)
+    return None if any(tests) else (a, b)
+
+
 @pytest.mark.parametrize(
     ("name", "wrong", "words"),
     [
@@ -55,6 +62,11 @@ def unbounded(mean, std, low, high, cap):
         ("match_moments", lambda *a: (1.0, 1.0), "wrong α or β"),
         ("match_moments", unbounded, "below 1"),
         ("match_moments", uncapped, "above the cap"),
+        ("match_moments", lambda m, s, lo, hi, c: moments(m, s, lo, hi, 80.0), "is an argument"),
+        ("match_moments", lambda *a: forgetting(*a, alpha=False), "above the cap"),
+        ("match_moments", lambda *a: forgetting(*a, beta=False), "above the cap"),
+        ("match_moments", lambda *a: forgetting(*a, small_alpha=False), "below 1"),
+        ("match_moments", lambda *a: forgetting(*a, small_beta=False), "below 1"),
         ("safe_beta_kl", lambda a, b, c, d: torchs_kl(c, d, a, b), "changed places"),
         ("safe_beta_kl", lambda *four: -torchs_kl(*four), "minus the divergence"),
         ("safe_beta_kl", lambda *four: torchs_kl(*four).double(), "type"),

@@ -40,7 +40,13 @@ def clip_with_nan(gradients: list[Tensor], max_norm: float) -> list[Tensor]:
     return scaled(clip(gradients, max_norm), torch.ones(3) + 0 * norms(gradients).max())
 
 
-@pytest.mark.parametrize("right", [clip, clip_in_place])
+def clip_where_too_long(gradients: list[Tensor], max_norm: float) -> list[Tensor]:
+    """As the task says it; NaN exceeds nothing, so a poisoned seed's other numbers stay as they are."""
+    norm = norms(gradients)
+    return scaled(gradients, torch.where(norm > max_norm, max_norm / norm, 1.0))
+
+
+@pytest.mark.parametrize("right", [clip, clip_in_place, clip_where_too_long])
 def test_clipping_per_seed_passes(right: Callable) -> None:
     assert graders_lockstep.clip_per_seed(right).passed is True
 
@@ -55,6 +61,7 @@ def test_clipping_per_seed_passes(right: Callable) -> None:
         (lambda g, m: scaled(g, (m / norms(g) ** 2).clamp(max=1)), "square root"),
         (lambda g, m: None, "nothing was clipped"),
         (clip_with_nan, "a NaN in one seed"),
+        (lambda g, m: [x.nan_to_num() for x in clip(g, m)], "a NaN in one seed"),
         (lambda g, m: g[:1], "array of shape"),
     ],
 )

@@ -42,6 +42,8 @@ def test_an_unanswered_exercise_is_not_a_failure(empty: object) -> None:
         (lambda x: 0 * x, "the value or its derivative is wrong"),
         (lambda x: stable(x.detach()) + 0 * x, "the value or its derivative is wrong"),
         (lambda x: 1 / 0, "ZeroDivisionError"),
+        (lambda x: by_logsigmoid(x) if x > 0 else stable(-x), "RuntimeError"),
+        (lambda x: stable(x).mean() + 0 * x, "wrong for a tensor"),
     ],
 )
 def test_known_mistakes_are_named(wrong: Callable, words: str) -> None:

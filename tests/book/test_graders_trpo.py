@@ -55,6 +55,12 @@ def test_a_right_step_passes() -> None:
     assert verdict.passed is True, verdict
 
 
+def test_a_line_search_that_forgives_a_half_is_seen() -> None:
+    verdict = graders.trpo_step(partial(step, allowed=lambda kl, model, max_kl: kl <= 1.5 * max_kl))
+    assert verdict.passed is False
+    assert 'check "trust": the exact KL divergence is 1.3 δ' in verdict.message
+
+
 def test_an_unanswered_step_is_not_a_failure() -> None:
     assert graders.trpo_step(lambda *_, **numbers: ...).passed is None
 

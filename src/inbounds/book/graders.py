@@ -253,10 +253,17 @@ def entropy_by_quadrature(function: Callable[..., Any]) -> Verdict:
 
         expected = integrate.quad(surprise, loc - 12 * scale, loc + 12 * scale, epsabs=1e-12, limit=200)[0]
         gaussian = stats.norm.entropy(loc, scale)
+        at_mean = loc - 2 * np.logaddexp(0.0, loc)
         mistakes = {
             "that is the Gaussian's entropy: entropy changes under the squashing": gaussian,
             "the interval's length is missing: add log(high − low)": expected - math.log(high - low),
             "the sign is wrong: entropy is minus the expected log-density": -expected,
+            "that has both errors yet: softplus of the mean is not the mean of softplus, and a length is missing": (
+                gaussian + at_mean
+            ),
+            "that takes softplus at the mean of z: average it over z instead": (
+                gaussian + at_mean + math.log(high - low)
+            ),
         }
         return Case((loc, scale, low, high), expected, mistakes, rtol=1e-5)
 

@@ -39,7 +39,7 @@ def match_moments(function: Callable[..., Any]) -> Verdict:
         answer = function(mean, std, low, high, cap)
         return NO_POLICY if answer is None else answer
 
-    def possible(mean: float, std: float, low: float, high: float) -> Case:
+    def possible(mean: float, std: float, low: float, high: float, cap: float = 80.0) -> Case:
         m, v = (mean - low) / (high - low), (std / (high - low)) ** 2
         alpha, beta = concentrations(m, v)
         unscaled = concentrations(m, std**2)
@@ -51,11 +51,11 @@ def match_moments(function: Callable[..., Any]) -> Verdict:
             "that takes the standard deviation for the variance": concentrations(m, std / (high - low)),
             "you refuse a mean and a spread that a policy can have": NO_POLICY,
         }
-        return Case((mean, std, low, high, 80.0), (alpha, beta), mistakes, hint="wrong α or β")
+        return Case((mean, std, low, high, cap), (alpha, beta), mistakes, hint="wrong α or β")
 
-    def refused(mean: float, std: float, low: float, high: float, why: str) -> Case:
+    def refused(mean: float, std: float, low: float, high: float, why: str, cap: float = 80.0) -> Case:
         given = concentrations((mean - low) / (high - low), (std / (high - low)) ** 2)
-        return Case((mean, std, low, high, 80.0), NO_POLICY, {why: given}, hint="this should be None")
+        return Case((mean, std, low, high, cap), NO_POLICY, {why: given}, hint="this should be None")
 
     too_wide = "one of the parameters would be below 1 here: return None"
     too_narrow = "one of the parameters would be above the cap here: return None"
@@ -63,7 +63,12 @@ def match_moments(function: Callable[..., Any]) -> Verdict:
         possible(0.2, 0.1, 0.0, 0.5),
         possible(0.3, 0.2, -1.0, 1.0),
         refused(0.9, 0.3, -1.0, 1.0, too_wide),
+        refused(-0.9, 0.3, -1.0, 1.0, too_wide),  # the other parameter
         refused(0.0, 0.01, -1.0, 1.0, too_narrow),
+        refused(0.8, 0.05, -1.0, 1.0, too_narrow),  # α alone
+        refused(-0.8, 0.05, -1.0, 1.0, too_narrow),  # β alone
+        refused(0.3, 0.2, -1.0, 1.0, "the cap is an argument: this one is 10", cap=10.0),
+        possible(0.0, 0.05, -1.0, 1.0, cap=300.0),
         possible(4.9, 0.09, 0.0, 5.0),
     ]
     attempt.__name__ = getattr(function, "__name__", "match_moments")

@@ -21,11 +21,18 @@ def clip_per_seed(function: Callable[..., Any]) -> Verdict:
 
     @functools.wraps(function)
     def rows(gradients: list[Tensor], max_norm: float) -> Any:
-        """The reader's answer as one row per seed; a function that returns nothing may have worked in place."""
+        """The reader's answer as one row per seed; a function that returns nothing may have worked in place.
+
+        A seed with a NaN is lost: whether the rest of its row is scaled, or NaN as well, is nobody's concern.
+        """
         ours = [gradient.clone() for gradient in gradients]
         answer = function(ours, max_norm)
         answer = ours if answer is None else answer
-        return answer if answer is ... else np.concatenate([_rows(each) for each in answer], 1)
+        if answer is ...:
+            return answer
+        found = np.concatenate([_rows(each) for each in answer], 1)
+        found[np.isnan(found).any(1)] = np.nan
+        return found
 
     def case(gradients: list[Tensor], max_norm: float) -> Case:
         flat = np.concatenate([_rows(each) for each in gradients], 1)  # [S, P]
@@ -61,10 +68,15 @@ def clip_per_seed(function: Callable[..., Any]) -> Verdict:
 
     poisoned = gradients((4, 2), (4, 1))
     poisoned[0][1, 0, 0] = torch.nan
+    lost = "a NaN in one seed must stay there: it has reached another, or is gone"
     cases = [
         case(gradients((5,), (3,)), 0.5),
         case(gradients((4, 3), (4, 1), (2, 4), (2, 1)), 1.0),
-        replace(case(poisoned, 0.5), mistakes={}, hint="a NaN in one seed has reached another"),
+        replace(
+            case(poisoned, 0.5),
+            mistakes={},
+            hint="a NaN in one seed must stay there: it has reached another, or is gone",
+        ),
     ]
     return judge(rows, cases, "right: each seed by its own norm, and a diverged one harms no other")
 

@@ -12,13 +12,13 @@ from inbounds.book.graders import Case, Verdict, judge
 def log_slope(function: Callable[..., Any]) -> Verdict:
     """The logarithm of 1 - tanh(x)², in single precision, with its gradient by autograd."""
 
-    def value_and_gradient(x: float) -> list[float]:
+    def value_and_gradient(x: float | list[float]) -> list[Any]:
         point = torch.tensor(x, dtype=torch.float32, requires_grad=True)
         answer = function(point)
         if not isinstance(answer, torch.Tensor):
             return answer  # unanswered; the judge says so
-        (gradient,) = torch.autograd.grad(answer, point)
-        return [answer.item(), gradient.item()]
+        (gradient,) = torch.autograd.grad(answer.sum(), point)
+        return [answer.tolist(), gradient.tolist()]
 
     value_and_gradient.__name__ = getattr(function, "__name__", "your function")
 
@@ -36,6 +36,8 @@ def log_slope(function: Callable[..., Any]) -> Verdict:
         }
         return Case((x,), [exact, slope], mistakes, hint=hint, rtol=3e-5)
 
+    alone = [case(x, "").expected for x in (-60.0, 0.3, 30.0)]
+    together = [list(column) for column in zip(*alone, strict=True)]
     far = "far out the value is −2|x| + log 4 and the slope ∓2: something is added, clamped, or rounded to 0"
     overflow = "for large negative x an exponential overflows: softplus, logaddexp or |x| keep it in range"
     cases = [
@@ -44,6 +46,13 @@ def log_slope(function: Callable[..., Any]) -> Verdict:
         case(8.0, far),
         case(30.0, far),
         case(-60.0, overflow),
+        Case(
+            ([-60.0, 0.3, 30.0],),
+            together,
+            {},
+            hint="right for single numbers, wrong for a tensor",
+            rtol=3e-5,
+        ),
     ]
     return judge(
         value_and_gradient, cases, "right, value and derivative, on both sides, as far as float32 goes"

@@ -167,6 +167,11 @@ def _knows_bad_actions(function: Loss) -> str | None:
         moved = scene.with_ratios(ratio).with_advantages(advantage)
         gradient = moved.gradients(policy_loss(function, moved))[0]
         wanted = moved.weighted_score(ratio * advantage)
+        if not alive and _close(gradient, wanted):
+            return (
+                "of the actions that were worse than expected, those with r < 1 − ε must be left alone: nothing is "
+                "clipped there"
+            )
         if not _close(gradient, wanted if alive else 0 * wanted):
             where = "r > 1 + ε must still be pushed down" if alive else "r < 1 − ε must be left alone"
             return (
