@@ -98,6 +98,13 @@ def test_torchrls_tanh_normal_is_the_logit_normal_of_twice_the_parameters(loc, l
     assert torch.allclose(theirs.deterministic_sample, ours.median, atol=1e-9)
 
 
+def test_the_deterministic_latent_of_a_beta_is_finite_where_its_mean_rounds_to_a_bound() -> None:
+    law = ScaledBeta(torch.tensor([0.7, 3e8]), torch.tensor([2.0, 1.0]), -1.0, 1.0)
+    latent = Latents(law).deterministic_sample
+    assert law.mean[1] == 1
+    assert torch.allclose(latent, torch.tensor([0.35, 3e8]).log())
+
+
 def test_a_saturated_action_keeps_its_score_only_in_its_latent() -> None:
     low, high = torch.from_numpy(LOW[:1]), torch.from_numpy(HIGH[:1])
     loc = torch.tensor([18.0], requires_grad=True)

@@ -104,6 +104,7 @@ def test_gradient_clipping_changes_the_run_and_none_means_none() -> None:
     ("wrong", "message"),
     [
         ({"minibatch_size": 60}, "2048 = 34 × 60"),
+        ({"minibatch_size": 1}, "one advantage has no standard deviation"),
         ({"gamma": 1.1}, r"gamma must lie in \[0, 1\], got 1.1"),
         ({"clip_range": 0.0}, "clip_range must be positive"),
         ({"entropy_coef": -1.0}, "entropy_coef must not be negative"),

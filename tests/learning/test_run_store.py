@@ -1,4 +1,5 @@
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,19 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one_and_no_rest(tmp_path: 
     with pytest.raises(TypeError):
         write_whole(tmp_path / "file", "no bytes")
     assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("file", b"old")]
+
+
+def test_two_writers_of_one_file_do_not_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, real = tmp_path / "file", os.fsync
+
+    def another_writes_meanwhile(file: int) -> None:
+        monkeypatch.setattr(os, "fsync", real)
+        write_whole(path, b"the other's, and longer")
+        real(file)
+
+    monkeypatch.setattr(os, "fsync", another_writes_meanwhile)
+    write_whole(path, b"ours")
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("file", b"ours")]
 
 
 @pytest.mark.parametrize("algo", ALGORITHMS)

@@ -119,6 +119,24 @@ def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:
     assert not torch.equal(weights(whole), weights(resumed))
 
 
+@pytest.mark.parametrize("algo", ["ppo", "trpo", "policy-gradient"])
+def test_a_state_is_a_snapshot(algo: str) -> None:
+    run = small_run(small_config(algo=algo, epochs=1))
+    state = run.state_dict()
+    first = run.epoch()
+    for _ in range(2):  # what a run does with a state that it has gone back to leaves that state as it is
+        run.load_state_dict(state)
+        assert len(run.records) == 1
+        assert same_records([run.epoch()], [first])
+
+
+@pytest.mark.parametrize("seeds", [np.arange(2), np.int64(2), (np.int32(0), 1)])
+def test_seeds_may_be_numpys(seeds: Any) -> None:
+    config = preset("common", "Hopper-v5", seeds=seeds)
+    assert config.seeds == (0, 1)
+    assert all(type(seed) is int for seed in config.seeds)
+
+
 def test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics() -> None:
     def forgetful(n: int) -> PointEnv:
         return PointEnv(n, saves=False)

@@ -104,6 +104,23 @@ def test_a_diverged_seed_counts_with_its_last_return_and_is_marked(outcomes: Out
     assert (row.difference.diverged, row.difference.n) == (1, 10)
 
 
+def test_aggregates_say_how_many_seeds_diverged(outcomes: Outcomes) -> None:
+    contrast = Contrast("standard", "ppo", "beta", "gaussian")
+    found = [
+        analysis.aggregate(outcomes, column("beta"), "final"),
+        analysis.improvement(outcomes, contrast, "final"),
+        analysis.by_way(outcomes.finished["standard-ant-ppo-beta"])["median"],
+    ]
+    profile = analysis.profile(outcomes, column("beta"), "final", [0.0, 1.0])
+    assert profile is not None
+    assert [estimate and estimate.diverged for estimate in (*found, profile.share)] == [1, 1, 1, 1]
+    without = [
+        analysis.aggregate(outcomes, column("beta"), "final", without_diverged=True),
+        analysis.aggregate(outcomes, column("logit-normal"), "final"),
+    ]
+    assert [estimate and estimate.diverged for estimate in without] == [0, 0]
+
+
 def test_differences_are_of_means_and_corrected_over_six_robots(outcomes: Outcomes) -> None:
     rows = analysis.differences(outcomes, PPO, "final")
     assert list(rows) == list(ROBOTS)

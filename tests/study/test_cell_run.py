@@ -125,6 +125,21 @@ def test_where_evaluations_start_depends_on_seed_and_epoch_alone(monkeypatch: py
     assert len({*first, *tenth, *finally_[0]}) == 2 + 2 + 20
 
 
+def test_sampled_actions_are_not_drawn_by_what_drew_their_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts, drawn = [], []
+
+    def play(_: Any, way: str, where: list[int], generators: list[np.random.Generator]) -> tuple[Any, Any]:
+        if way == "sample":
+            starts.extend(where)
+            drawn.extend(int(x) for g in generators for x in g.integers(2**31, size=10))
+        return np.zeros((2, 10)), np.zeros((2, 10))
+
+    monkeypatch.setattr(evaluate.Players, "play", play)
+    evaluate.evaluate_finally(MeasuredTrainer(small_cell(epochs=1)).trainer)
+    assert len(starts) == len(drawn) == 20
+    assert len({*starts, *drawn}) == 40
+
+
 def test_rows_have_the_schema(whole: pa.Table) -> None:
     names = whole.column_names
     assert names[: len(EVERY_EPOCH)] == list(EVERY_EPOCH)
@@ -200,6 +215,30 @@ def test_a_damaged_checkpoint_costs_ten_epochs(tmp_path: Path, whole: pa.Table) 
     path.write_bytes(path.read_bytes()[:-1000])
     with pytest.warns(UserWarning, match=r"is damaged.*going on from the one before, epoch 20"):
         assert run_cell(small_cell(), folder) == "finished"
+    assert first_mismatch(whole, rows_of(folder)) == ""
+
+
+def test_a_damaged_checkpoint_does_not_take_the_place_of_the_good_one(
+    tmp_path: Path, whole: pa.Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = folder_in(tmp_path)
+    run_cell(small_cell(), folder, stop=stop_after(24))
+    path = folder.work_of(small_cell()) / checkpoint.FILE_NAME
+    path.write_bytes(path.read_bytes()[:-1000])
+
+    def save(path: Path, state: dict[str, Any]) -> None:
+        raise FULL
+
+    def run_on_a_full_disk() -> None:
+        with pytest.raises(DiskFullError, match="The last checkpoint is kept"):
+            run_cell(small_cell(), folder)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "save", save)
+        with pytest.warns(UserWarning, match="going on from the one before"):
+            run_on_a_full_disk()
+    assert run_cell(small_cell(), folder) == "finished"
+    assert read_metadata(folder.cell_file(small_cell()))["sessions"][-1]["from_epoch"] == 20
     assert first_mismatch(whole, rows_of(folder)) == ""
 
 

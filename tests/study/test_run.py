@@ -189,6 +189,104 @@ def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) ->
     assert sessions[1]["from_epoch"] > 0
 
 
+def a_run(tmp_path: Path, body: str) -> str:
+    """What a study says whose cells are replaced by a few lines: `attempt(cell, folder, stop, deadline)`."""
+    script = textwrap.dedent("""
+        import os, signal, sys, time, warnings
+        from pathlib import Path
+        from inbounds.study import run
+        from tests.study.small import folder_in
+        from tests.study.test_run import cells_of
+
+        LINES
+
+        run.attempt = attempt  # a spawned process imports this module again
+
+        if __name__ == "__main__":
+            prepare()
+            summary = run.run_study(cells_of(1), folder_in(Path(sys.argv[1])), run.Settings(jobs=2))
+            print(summary.signal, sorted(report.outcome for report in summary.reports.values()))
+    """).replace("LINES", textwrap.dedent(body))
+    path, root = tmp_path / "script.py", Path(__file__).parents[2]
+    path.write_text(script)
+    done = subprocess.run(
+        [sys.executable, str(path), str(tmp_path)],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            for i in range(3000):
+                warnings.warn(f"warning {i % 1000} " + 10_000 * "-")  # the first twenty are more than a pipe holds
+            return run.Report("finished")
+
+        def prepare():
+            pass
+        """,
+    )
+    assert "0 ['finished', 'finished', 'finished']" in said
+    assert said.count("warning 7 ") == 3
+    assert said.count("and 980 more warnings") == 3
+
+
+def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            end = time.monotonic() + 60
+            while time.monotonic() < end and not stop():
+                time.sleep(0.05)
+            return run.Report("stopped" if stop() else "never told")
+
+        def prepare():
+            real, asked = run.StudyFolder.state, []
+
+            def state(folder, cell):
+                asked.append(cell)
+                if len(asked) == 2:  # the first cell runs, the second is about to
+                    os.kill(os.getpid(), signal.SIGTERM)
+                return real(folder, cell)
+
+            run.StudyFolder.state = state
+        """,
+    )
+    assert f"{signal.SIGTERM.value} ['stopped']" in said
+
+
+def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            return run.Report("finished")
+
+        def prepare():
+            real = run.StudyFolder.state
+
+            def state(folder, cell):
+                if cell.family == "beta":
+                    raise PermissionError("not yours")
+                return real(folder, cell)
+
+            run.StudyFolder.state = state
+        """,
+    )
+    assert "not yours: choose other folders" in said
+    assert "0 ['failed', 'finished', 'finished']" in said
+
+
 def test_no_scheduler_there_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     where = ["--results", str(tmp_path / "r"), "--work", str(tmp_path / "w")]

@@ -163,7 +163,10 @@ class ClippedNormal(BoundedDistribution):
 
     @property
     def variance(self) -> Tensor:
-        """`[...]` variance of the clipped value, in closed form about the median: no cancellation."""
+        """`[...]` variance of the clipped value, in closed form about the median.
+
+        Good to seven digits while scale is below 10⁴ lengths of the box; a Normal much wider than that loses digits.
+        """
         _, first, second = self._moments()
         unit_variance = (second - first.square()).clamp(min=0)
         return (self.scale.double().square() * unit_variance).to(self.low.dtype)

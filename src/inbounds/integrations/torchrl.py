@@ -79,7 +79,10 @@ class Latents(Distribution):
     @property
     def deterministic_sample(self) -> Tensor:
         """`[..., A]` the latents of a logit-normal's median, or of a Beta's mean: TorchRL's deterministic action."""
-        return self.law.loc if isinstance(self.law, LogitNormal) else self.law.value_to_latent(self.law.mean)
+        law = self.law
+        return (
+            law.loc if isinstance(law, LogitNormal) else law.concentration1.log() - law.concentration0.log()
+        )
 
 
 @register_kl(Latents, Latents)

@@ -42,12 +42,13 @@ def check(
                 raise ValueError(f"{name} must {rule}, got {value}")
 
 
-def check_minibatches(horizon: int, minibatch_size: int) -> None:
+def check_minibatches(horizon: int, minibatch_size: int, normalized: int | None = None) -> None:
     """Raise a ValueError unless minibatches divide the rollout without a rest.
 
     Args:
         horizon: T.
         minibatch_size: B.
+        normalized: number of advantages that are normalised together; None where they are not.
 
     Example:
         >>> check_minibatches(100, 64)
@@ -58,4 +59,9 @@ def check_minibatches(horizon: int, minibatch_size: int) -> None:
     if rest:
         raise ValueError(
             f"minibatch_size must divide horizon, but {horizon} = {quotient} × {minibatch_size} + {rest}"
+        )
+    if normalized == 1:
+        raise ValueError(
+            "one advantage has no standard deviation to divide it by: make horizon and minibatch_size larger than 1, "
+            "or set normalize_advantage=False"
         )

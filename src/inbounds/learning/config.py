@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Literal, TypeAlias
+
+import numpy as np
 
 from inbounds.learning import policy_gradient, ppo, trpo
 from inbounds.learning.actor_critic import NetworkConfig
@@ -56,6 +59,7 @@ class TrainConfig:
     """Epochs between checkpoints, where a run directory is given; the last epoch always has one."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "seeds", tuple(map(operator.index, self.seeds)))  # NumPy's integers, too
         check(self, positive=("epochs", "checkpoint_every"))
         if not self.seeds or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
             raise ValueError(
@@ -108,7 +112,7 @@ def preset(
         raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
     common = TrainConfig(
         env=env,
-        seeds=tuple(range(seeds)) if isinstance(seeds, int) else tuple(seeds),
+        seeds=tuple(range(seeds) if isinstance(seeds, int | np.integer) else seeds),
         epochs=epochs,
         algorithm=ALGORITHMS[algo][0](),
         policy=PolicyConfig(policy),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def write_whole(path: Path, data: Any) -> None:
         ...     (Path(folder) / "file").read_bytes()
         b'all of it'
     """
-    temporary = path.with_name(f".{path.name}.partial")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")  # each writer's own
     try:
         with open(temporary, "wb") as file:
             file.write(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -55,12 +56,12 @@ class SeedAdam:
         self._adam.step()
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the moments and the step count."""
-        return self._adam.state_dict()
+        """Return a copy of the moments and the step count."""
+        return copy.deepcopy(self._adam.state_dict())
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go back to a state."""
-        self._adam.load_state_dict(state)
+        self._adam.load_state_dict(copy.deepcopy(state))
 
 
 @torch.no_grad()

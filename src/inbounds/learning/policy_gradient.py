@@ -60,7 +60,8 @@ class PolicyGradientConfig:
         check(self, positive=("horizon", "policy_learning_rate", "learning_rate", "adam_eps", "num_epochs"))
         check(self, positive=("minibatch_size",), unit=("gamma", "gae_lambda"))
         check(self, not_negative=("entropy_coef",), positive_or_none=("max_grad_norm",))
-        check_minibatches(self.horizon, self.minibatch_size)
+        together = self.horizon if self.normalize_advantage else None
+        check_minibatches(self.horizon, self.minibatch_size, together)
 
 
 @dataclass

@@ -68,7 +68,8 @@ class PPOConfig:
         check(self, positive=("horizon", "learning_rate", "adam_eps", "num_epochs", "minibatch_size"))
         check(self, positive=("clip_range",), unit=("gamma", "gae_lambda"))
         check(self, not_negative=("entropy_coef", "value_coef"), positive_or_none=("max_grad_norm",))
-        check_minibatches(self.horizon, self.minibatch_size)
+        together = self.minibatch_size if self.normalize_advantage else None
+        check_minibatches(self.horizon, self.minibatch_size, together)
 
 
 def make_optimizer(networks: ActorCritic, config: PPOConfig) -> SeedAdam:

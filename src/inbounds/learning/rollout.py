@@ -278,6 +278,11 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
             "(gymnasium.wrappers.FlattenObservation) so that they are"
         )
     box = envs.single_action_space
+    if isinstance(box, gymnasium.spaces.Box) and not np.issubdtype(box.dtype, np.floating):
+        raise ValueError(
+            f"actions must be real numbers, got {box}, which would cut off what follows the point: wrap the "
+            "environment (gymnasium.wrappers.TransformAction) so that it rounds, and offers floating-point numbers"
+        )
     if not isinstance(box, gymnasium.spaces.Box) or len(box.shape) != 1 or not box.is_bounded():
         raise ValueError(
             f"actions must be a bounded, one-dimensional Box, got {box}: wrap the environment "

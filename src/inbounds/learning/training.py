@@ -74,7 +74,10 @@ class Trainer:
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
         space = self.envs.single_action_space
         if not isinstance(space, gymnasium.spaces.Box):
-            raise ValueError(f"actions must be a bounded, one-dimensional Box, got {space}")
+            raise ValueError(
+                f"actions must be a bounded, one-dimensional Box, got {space}: wrap the environment "
+                "(gymnasium.wrappers.RescaleAction, FlattenAction) so that they are"
+            )
         policy = Policy(config.policy, space.low, space.high)
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
@@ -145,15 +148,15 @@ class Trainer:
         return policies_of(self)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that the future depends on, and the records so far."""
+        """Return everything that the future depends on, and the records so far; later epochs leave it as it is."""
         return {
             "config": describe(self.config),
             "networks": self.networks.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "collector": self.collector.state_dict(),
             "shuffle": generator_states([stream.shuffle for stream in self.streams]),
-            "records": self.records,
-            "diverged": self.diverged,
+            "records": list(self.records),
+            "diverged": self.diverged.copy(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:

@@ -82,7 +82,8 @@ class TRPOConfig:
         check(self, positive=("max_kl", "cg_iters", "max_backtracks"), unit=("gamma", "gae_lambda"))
         check(self, not_negative=("entropy_coef", "damping"), positive_or_none=("max_grad_norm",))
         check(self, positive=("backtrack_coef",), unit=("backtrack_coef",))
-        check_minibatches(self.horizon, self.minibatch_size)
+        together = self.horizon if self.normalize_advantage else None
+        check_minibatches(self.horizon, self.minibatch_size, together)
         if self.fisher not in ("hessian", "sampled"):
             raise ValueError(f"fisher must be hessian or sampled, got {self.fisher!r}")
 
@@ -172,7 +173,7 @@ def conjugate_gradient(product: Product, b: Tensor, iterations: int, tolerance: 
         product: v ↦ F v.
         b: `[S, P]` right-hand sides.
         iterations: as many products are taken.
-        tolerance: a seed whose squared residual has fallen below it stands still; the others go on.
+        tolerance: a seed whose squared residual is below it stands still. For |b|² < 1e-6 it shrinks with |b|².
 
     Returns:
         `[S, P]`.
@@ -186,9 +187,10 @@ def conjugate_gradient(product: Product, b: Tensor, iterations: int, tolerance: 
     x = torch.zeros_like(b)
     residual, direction = b.clone(), b.clone()
     square = dot(residual, residual)  # [S, 1]
+    small = tolerance * (square / 1e-6).clamp(max=1)  # a short right-hand side is not a solved system
     for _ in range(iterations):
         image = product(direction)
-        moving = square > tolerance
+        moving = square > small
         alpha = torch.where(moving, square / dot(direction, image), 0)
         x = x + alpha * direction
         residual = residual - alpha * image

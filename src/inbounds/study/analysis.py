@@ -11,6 +11,7 @@ everything without them. Every number has a random generator of its own, seeded 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -155,10 +156,9 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
         >>> sorted(by_way(outcomes.finished["standard-hopper-ppo-beta"]))
         ['mean', 'median', 'mode', 'sample']
     """
+    mean = functools.partial(statistics.bootstrap, statistic="mean", missing="exclude")
     return {
-        way: statistics.bootstrap(
-            values, generator_for("way", outcome.cell.id, way), statistic="mean", missing="exclude"
-        )
+        way: _marked(mean(values, generator_for("way", outcome.cell.id, way)), outcome)
         if _countable(values) >= 2
         else None
         for way, values in outcome.ways.items()
@@ -281,7 +281,8 @@ def aggregate(
     if not found:
         return None
     rng = generator_for("aggregate", *column, endpoint, without_diverged)
-    return statistics.aggregate(found, rng, missing="exclude")
+    iqm = statistics.aggregate(found, rng, missing="exclude")
+    return iqm if without_diverged else _marked(iqm, *outcomes.of_column(column, found))
 
 
 def improvement(
@@ -302,7 +303,9 @@ def improvement(
     if not (first.keys() >= set(ROBOTS) and second.keys() >= set(ROBOTS)):
         return None
     rng = generator_for("improvement", *contrast, endpoint, without_diverged)
-    return statistics.probability_of_improvement(first, second, rng, missing="exclude")
+    better = statistics.probability_of_improvement(first, second, rng, missing="exclude")
+    both = [outcome for column in contrast.columns for outcome in outcomes.of_column(column, ROBOTS)]
+    return better if without_diverged else _marked(better, *both)
 
 
 def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: ArrayLike) -> Profile | None:
@@ -318,9 +321,10 @@ def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: Array
     found = normalized(outcomes, column, endpoint)
     if not found:
         return None
-    return statistics.performance_profile(
+    whole = statistics.performance_profile(
         found, thresholds, generator_for("profile", *column, endpoint), missing="exclude"
     )
+    return dataclasses.replace(whole, share=_marked(whole.share, *outcomes.of_column(column, found)))
 
 
 def _scores_by_robot(

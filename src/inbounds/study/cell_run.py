@@ -176,6 +176,8 @@ class _CellRun:
                     f"{folder} is not this cell's, or another version's ({error}): move {self.work} away to start anew"
                 ) from error
             if complaints:
+                # Out of the way: the next save puts the newest checkpoint in the place of the one that has just served.
+                os.replace(self.work / checkpoint.FILE_NAME, self.work / f"damaged-{checkpoint.FILE_NAME}")
                 warnings.warn(
                     f"{complaints[0]}; going on from the one before, epoch {self.run_.done}", stacklevel=2
                 )

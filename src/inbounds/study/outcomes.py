@@ -9,7 +9,7 @@ Only whole cells are read: one that is not finished, damaged, or of another conf
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -177,6 +177,10 @@ class Outcomes:
             MappingProxyType({**self.states, **more.states}),
             self.folder,
         )
+
+    def of_column(self, column: Column, robots: Iterable[str]) -> list[Outcome]:
+        """Return a column's finished cells on some robots; `find`, for one robot, has an example."""
+        return [outcome for robot in robots if (outcome := self.find(column, robot)) is not None]
 
     def find(self, column: Column, robot: str) -> Outcome | None:
         """Return a column's cell on a robot, None where it is not finished.

@@ -39,6 +39,8 @@ ENVIRONMENT = {  # of the processes; none of it changes a result
     "MALLOC_MMAP_THRESHOLD_": str(1 << 20),
 }
 LOOK_EVERY = 1.0  # seconds between looks at running cells
+MOST_WARNINGS = 20  # of a cell that are shown
+OTHER_FOLDERS = "choose other folders with --results and --work"
 
 
 @dataclass(frozen=True)
@@ -160,12 +162,12 @@ class _LocalRun:
                 while self.waiting or self.running:
                     if self.signal or time.time() > self.deadline:
                         self.waiting.clear()
-                    while self.waiting and len(self.running) < self.jobs:
+                    while self.waiting and len(self.running) < self.jobs and not self.signal:
                         self._start(self.waiting.popleft())
-                    ready = multiprocessing.connection.wait(
-                        [r.process.sentinel for r in self.running], timeout=LOOK_EVERY
-                    )
-                    for running in [r for r in self.running if r.process.sentinel in ready]:
+                    # A report that is larger than the pipe holds its process until it is read.
+                    ends = [end for r in self.running for end in (r.results, r.process.sentinel)]
+                    ready = multiprocessing.connection.wait(ends, timeout=LOOK_EVERY)
+                    for running in [r for r in self.running if {r.results, r.process.sentinel} & {*ready}]:
                         self._end(running)
                     self.progress.update([r.cell for r in self.running])
             finally:
@@ -175,26 +177,31 @@ class _LocalRun:
         return Summary(self.reports, self.signal)
 
     def _start(self, cell: Cell) -> None:
-        if self.folder.state(cell) == "finished":
-            return self._report(cell, Report("was finished"))
+        try:
+            if self.folder.state(cell) == "finished":
+                return self._report(cell, Report("was finished"))
+        except OSError as error:
+            return self._report(cell, Report("failed", f"{error}: {OTHER_FOLDERS}"))
         context = multiprocessing.get_context("spawn")  # a fork would inherit torch's threads
         receiver, sender = context.Pipe(duplex=False)
         arguments = (cell, self.folder, self.settings.nice, self.deadline, os.getpid(), sender)
         process = context.Process(target=_run_in_child, args=arguments, name=cell.id)
         with _lean(), _signals_held():
-            process.start()
+            if not self.signal:  # one that came just now found nothing of this cell to stop
+                process.start()
+                self.running.append(_Running(cell, process, receiver))
         sender.close()
-        self.running.append(_Running(cell, process, receiver))
         return None
 
     def _end(self, running: _Running) -> None:
         cell, process, results = running
         self.running.remove(running)
-        process.join()
         try:
             report, warned = results.recv()
-        except EOFError:
+        except (EOFError, OSError):  # it died before its report, or in the middle of it
+            process.join()
             report, warned = self._death(cell, process.exitcode or 0), []
+        process.join()
         results.close()
         for message in warned:
             self.progress.say(f"{cell.id}: {message}")
@@ -269,7 +276,14 @@ def _run_in_child(
             report = attempt(cell, folder, lambda: bool(wish) or os.getppid() != parent, deadline)
         # A parent that is gone reads nothing.
         with contextlib.suppress(BrokenPipeError):
-            results.send((report, [str(warning.message) for warning in caught]))
+            results.send((report, _each_once([str(warning.message) for warning in caught])))
+
+
+def _each_once(messages: Sequence[str]) -> list[str]:
+    """Different messages, the first ones; how many more there were is said."""
+    different = list(dict.fromkeys(messages))
+    more = len(different) - MOST_WARNINGS
+    return [*different[:MOST_WARNINGS], *([f"and {more} more warnings"] if more > 0 else [])]
 
 
 def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Report:
@@ -283,7 +297,7 @@ def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Repo
     except StudyError as error:
         return Report("failed", str(error))
     except OSError as error:
-        return Report("failed", f"{error}: choose other folders with --results and --work")
+        return Report("failed", f"{error}: {OTHER_FOLDERS}")
     except Exception:
         return Report("failed", f"a fault of the program, please report it:\n{traceback.format_exc()}")
 

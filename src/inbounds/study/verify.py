@@ -161,6 +161,7 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
     epochs = min(epochs, cell.epochs)
     run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
     if different := differences(run.config, metadata["config"], FREE_TO_CHANGE):
+        run.close()
         said = ", ".join(different)
         return Finding(cell.id, False, f"its file was made with another configuration ({said})")
     for _ in range(epochs):
