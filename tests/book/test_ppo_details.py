@@ -71,4 +71,4 @@ def test_the_plan_is_the_studys() -> None:
 
 @pytest.mark.parametrize("folder", ["nowhere", "."])
 def test_an_empty_folder_is_no_error(folder: str, tmp_path: Path) -> None:
-    assert "not yet run" in what_details_cost(tmp_path / folder)._repr_html_()
+    assert "Not yet run, on any robot" in what_details_cost(tmp_path / folder)._repr_html_()

@@ -56,6 +56,9 @@ class CostTable:
         return f"<table: {len(self.rows)} rows of detail and robot, {len(self.families)} families>"
 
     def _repr_html_(self) -> str:
+        if all(cell in (NOT_RUN, NOT_PLANNED) for cells in self.rows.values() for cell in cells):
+            details = dict.fromkeys(html.escape(detail) for detail, _ in self.rows)
+            return f"<p>Not yet run, on any robot: the study's cells for {', '.join(details)}.</p>"
         heads = "".join(f"<th scope='col'>{FAMILIES[family].label}</th>" for family in self.families)
         body = "".join(
             f"<tr><th scope='row'>{html.escape(detail)}</th><td>{robot}</td>"

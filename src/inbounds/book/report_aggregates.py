@@ -35,7 +35,7 @@ def aggregates(outcomes: Outcomes, arm: str, title: str) -> list[str]:
     own = [column for row in columns.values() for column in row.values() if column.arm == arm]
     if not any(analysis.normalized(outcomes, column, "final") for column in own):
         lacking = [r for r in ROBOTS if any(outcomes.find(c, r) is None for c in (REFERENCE, *own))]
-        said = f"missing: aggregates need all six robots; not complete yet: {', '.join(lacking)}."
+        said = f"missing ({title}): aggregates need all six robots; not complete yet: {', '.join(lacking)}."
         return [*parts, html.paragraph(said, "missing")]
     references = analysis.references(outcomes)
     if flat := [robot for robot, (zero, one) in references.items() if one <= zero]:

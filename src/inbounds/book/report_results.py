@@ -34,12 +34,15 @@ def score_sheet(outcomes: Outcomes) -> list[str]:
         found = Counter(
             verdict(row) or "missing" for row in analysis.differences(outcomes, contrast, "final").values()
         )
+        counts = [str(found[word]) for word in _WORDS]
+        if found["missing"] == len(ROBOTS):  # noughts would read as a result
+            counts[:-1] = ["missing", *["–"] * (len(_WORDS) - 2)]
         said = "" if contrast.arm == "beyond" else THESIS[contrast.algorithm, contrast.first, contrast.second]
         rows.append(
             [
                 title_of(contrast.arm, contrast.algorithm),
                 pair_name(contrast),
-                *(str(found[w]) for w in _WORDS),
+                *counts,
                 said,
             ]
         )

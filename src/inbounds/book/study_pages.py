@@ -182,7 +182,8 @@ def _of_arm(
 ) -> Shown:
     title = report_arms.title_of(arm, algorithm)
     cells = report_arms.cells_of(outcomes, arm, algorithm)
-    told = parts(title, cells) if report_arms.any_finished(cells) else [report_arms.NONE_FINISHED]
+    lacking = html.paragraph(f"missing ({what}): no cell of “{title}” is finished.", "missing")
+    told = parts(title, cells) if report_arms.any_finished(cells) else [lacking]
     return _shown(f"study: {what}, {title}", told)
 
 
