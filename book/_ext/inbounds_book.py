@@ -4,6 +4,7 @@
   throw ``THEBE_JS_URL has already been declared``.
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
+* Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
@@ -100,6 +101,20 @@ def resolve_public_name(
     return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", known[0], node, contnode)
 
 
+def as_prose(number: str) -> str:
+    """Return a formatted number with a real minus sign, and a narrow space between its thousands."""
+    grouped = re.sub(r"(?<=\d),(?=\d{3}(?!\d))", "\N{NARROW NO-BREAK SPACE}", number)
+    return re.sub(r"(?<![\w)\]])-(?=\d)", "\N{MINUS SIGN}", grouped)
+
+
+def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Set glued numbers, which Python's format codes write with hyphens and commas, as typed ones are."""
+    for inline in doctree.findall(nodes.inline):
+        if "pasted-text" in inline["classes"]:
+            for text in list(inline.findall(nodes.Text)):
+                text.parent.replace(text, nodes.Text(as_prose(text.astext())))
+
+
 def is_thebe(script: Any) -> bool:
     """Whether a script tag comes from sphinx-thebe: its file, or its inline settings."""
     attributes = getattr(script, "attributes", {})
@@ -113,5 +128,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500
     app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("missing-reference", resolve_public_name)
+    app.connect("doctree-resolved", set_numbers)
     app.connect("build-finished", copy_explorables)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
