@@ -111,6 +111,18 @@ def actor_critic(config: PolicyConfig, dtype: str = "float64") -> ActorCritic:
     return ActorCritic(policy, 5, NetworkConfig(hidden_sizes=(16,), dtype=dtype), generators())
 
 
+def test_each_head_has_its_own_gain() -> None:
+    policy = Policy(PolicyConfig("gaussian"), -np.ones(2), np.ones(2))
+    for config, gains in (
+        (NetworkConfig(dtype="float64"), (0.01, 1.0)),
+        (NetworkConfig(policy_head_gain=0.3, value_head_gain=5.0, dtype="float64"), (0.3, 5.0)),
+    ):
+        nets = ActorCritic(policy, 5, config, generators())
+        for net, gain in zip(nets.networks, gains, strict=True):
+            singular = torch.linalg.svdvals(net.layers[-1].weight.detach())
+            assert torch.allclose(singular, torch.full_like(singular, gain), rtol=1e-9)
+
+
 def test_initial_std_sets_the_heads_bias() -> None:
     nets = actor_critic(PolicyConfig("logit-normal", initial_std=0.4166))
     parameters = nets.parameters(torch.zeros(3, 1, 5).double())

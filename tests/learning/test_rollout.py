@@ -55,6 +55,20 @@ def test_a_rollout_is_what_happened(family: str) -> None:
     assert [[float(r) for r in rs] for rs in returns] == [list(r) for r in rollout.episode_returns]
 
 
+def test_an_episode_cut_off_by_the_last_step_is_worth_its_own_final_observation() -> None:
+    acting = collector("beta", normalize_obs=False)
+    seeds = [stream.environment for stream in acting.streams]
+    rollout = acting.collect(40)  # two episodes of twenty steps
+    _, following, *_, info = replay(rollout, seeds)[-1]
+    final = np.stack(list(info["final_obs"]))
+    own, next_episodes = (
+        acting.networks.values(torch.from_numpy(x)[:, None])[:, 0] for x in (final, following)
+    )
+    assert rollout.truncated[:, -1].all()
+    assert torch.allclose(rollout.bootstrap[:, -1], own, atol=1e-12)
+    assert ((own - next_episodes).abs() > 1e-3).all()
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_actions_come_from_latents_and_log_probs_belong_to_them(family: str) -> None:
     acting = collector(family, low=(-1.0, -0.5), high=(1.0, 2.0))
@@ -126,6 +140,18 @@ def test_a_readers_own_gymnasium_environment() -> None:
                 [lambda: gymnasium.make("CartPole-v1")] * n, autoreset_mode=AutoresetMode.SAME_STEP
             ),
             "one-dimensional Box",
+        ),
+        (
+            lambda n: SyncVectorEnv(
+                [
+                    lambda: gymnasium.wrappers.TransformAction(
+                        gymnasium.make("Pendulum-v1"), lambda a: a, gymnasium.spaces.Box(0, 3, (1,), np.int64)
+                    )
+                ]
+                * n,
+                autoreset_mode=AutoresetMode.SAME_STEP,
+            ),
+            "real numbers.*cut off.*TransformAction",
         ),
         (
             lambda n: SyncVectorEnv(

@@ -88,6 +88,18 @@ def test_conjugate_gradients_solve_what_a_dense_solver_solves() -> None:
     assert torch.allclose(x, torch.linalg.solve(matrix, b), rtol=1e-6, atol=1e-8)
 
 
+def test_a_step_does_not_depend_on_the_unit_of_the_advantages() -> None:
+    run = small_run(small_config(algo="trpo", epochs=1))
+    rollout = run.collector.collect(64)
+    config = TRPOConfig(entropy_coef=0.0)
+    whole, tiny = (
+        trpo.natural_step(run.networks, rollout, unit * torch.ones_like(rollout.reward).cumsum(1), config)
+        for unit in (1.0, 1e-7)
+    )
+    assert (torch.nn.functional.cosine_similarity(whole, tiny) > 0.999).all()
+    assert torch.allclose(whole.norm(dim=1), tiny.norm(dim=1), rtol=0.02)
+
+
 def test_conjugate_gradients_keep_seeds_apart() -> None:
     matrix = torch.diag(torch.tensor([1.0, 4.0, 9.0])).double()
     b = torch.tensor([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [torch.nan, 1.0, 1.0]], dtype=torch.float64)
@@ -122,6 +134,20 @@ def test_the_full_step_has_the_length_of_the_trust_region() -> None:
     step = trpo.natural_step(nets, rollout, advantage, config)
     product = trpo.damped(trpo.kl_hessian_product(nets, rollout.obs), config.damping)
     assert torch.allclose(trpo.dot(step, product(step)) / 2, torch.full((2, 1), config.max_kl).double())
+
+
+def test_a_step_that_is_good_is_taken_whole() -> None:
+    trainer, nets, rollout = started(horizon=128)
+    config = trainer.config.algorithm
+    advantage, _ = rollout.advantages(config.gamma, config.gae_lambda)
+    before, old = trpo.surrogate(nets, rollout, advantage, config.entropy_coef)
+    start = nets.actor.theta.clone()
+    step = trpo.natural_step(nets, rollout, advantage, config) / 2  # well within the trust region
+    search = trpo.line_search(nets, rollout, advantage, step, config)
+    assert search.fraction.tolist() == [1.0, 1.0]
+    assert torch.equal(nets.actor.theta, start + step)
+    after, new = trpo.surrogate(nets, rollout, advantage, config.entropy_coef)
+    assert ((after > before) & (nets.policy.law.kl(old, new).mean(1) <= config.max_kl)).all()
 
 
 def test_each_seeds_search_has_its_own_end() -> None:

@@ -1,18 +1,23 @@
 """The pieces that PPO, TRPO and REINFORCE share: statistics, advantages, minibatches, Adam."""
 
 import copy
+import dataclasses
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from torch.distributions import Normal, kl_divergence
 
-from inbounds.learning import Mlp, RunningNormalizer, gae, normalize_advantage
+from inbounds.learning import Mlp, RunningNormalizer, Trainer, gae, normalize_advantage
+from inbounds.learning.config import ALGORITHMS
+from inbounds.learning.diagnostics import diagnose
 from inbounds.learning.minibatches import minibatches
 from inbounds.learning.networks import initialize_pytorch
 from inbounds.learning.optimizer import SeedAdam, clip_gradients
-from tests.learning.small import rng, small_config, small_run
+from tests.learning.point import PointEnv
+from tests.learning.small import FAMILIES, rng, small_config, small_run
 
 
 def test_running_statistics_are_those_of_the_whole_sample() -> None:
@@ -136,3 +141,41 @@ def test_clipping_is_joint_over_networks_and_apart_for_seeds() -> None:
     clip_gradients([a, b], 1.0)
     assert torch.cat([a, b], 1)[0].norm() == pytest.approx(1.0, rel=1e-5)
     assert torch.equal(torch.cat([a, b], 1)[2], torch.tensor([0.1, 0.2]))
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_where_no_action_is_better_the_bonus_raises_the_entropy(algo: str, family: str) -> None:
+    config = small_config(algo, family, dtype="float64", entropy_coef=1.0)
+    trainer = Trainer(config, PointEnv)
+    nets, rollout = trainer.networks, trainer.collector.collect(128)
+    nothing = torch.zeros_like(rollout.reward)
+    still = dataclasses.replace(rollout, reward=nothing, value=nothing, bootstrap=nothing)
+    before = nets.policy.family.entropy(rollout.parameters).mean(1)
+    shuffles = [stream.shuffle for stream in trainer.streams]
+    ALGORITHMS[algo][1].update(nets, trainer.optimizer, still, shuffles, config.algorithm)
+    after = nets.policy.family.entropy(nets.parameters(rollout.obs)).mean(1)
+    assert (after > before + 1e-4).all()
+
+
+def test_diagnostics_are_those_of_two_known_laws() -> None:
+    """Networks of biases alone: one Normal before the update, another after it, whatever the state."""
+    trainer = Trainer(small_config(dtype="float64"), PointEnv)
+    nets = trainer.networks
+    nets.actor.theta.zero_()
+
+    def law_of(*head: float) -> Normal:
+        loc, log_scale = torch.tensor(head, dtype=torch.float64).view(2, 2)
+        nets.actor.theta[:, -4:] = torch.cat([loc, log_scale])
+        return Normal(loc, log_scale.exp())
+
+    old = law_of(0.3, -0.2, 0.1, -0.4)
+    rollout = trainer.collector.collect(128)
+    new = law_of(0.1, 0.2, -0.5, 0.3)
+    found, ratio = diagnose(nets, rollout, rollout.value)
+    log_ratio = (new.log_prob(rollout.latent) - old.log_prob(rollout.latent)).sum(-1)
+    assert torch.allclose(ratio, log_ratio.exp())
+    assert torch.allclose(found["kl"], kl_divergence(old, new).sum())
+    assert torch.allclose(found["approx_kl"], (log_ratio.exp() - 1 - log_ratio).mean(1))
+    assert torch.allclose(found["entropy"], new.entropy().sum())
+    assert not torch.isclose(kl_divergence(old, new).sum(), kl_divergence(new, old).sum(), rtol=0.1)

@@ -384,6 +384,16 @@ def test_the_paired_test_flips_every_sign() -> None:
     assert ours == pytest.approx(exact, abs=4 * np.sqrt(exact / 20_000))
 
 
+@pytest.mark.parametrize("paired", [False, True])
+def test_the_observed_order_counts_as_one_permutation(paired: bool) -> None:
+    """Of groups far apart 2 in 2²⁰ orders at most are as extreme as the observed one: 99 draws have none."""
+    a, b = rng(1).normal(1e3, 1, 20), rng(2).normal(0, 1, 20)
+    assert statistics.permutation_test(a, b, rng(), paired=paired, permutations=99) == 1 / 100
+    near = b[::-1] + 0.2  # about every second order is as extreme
+    one = {statistics.permutation_test(near, b, rng(s), paired=paired, permutations=1) for s in range(40)}
+    assert one == {1 / 2, 1.0}
+
+
 def test_the_permutation_test_keeps_its_level_under_unequal_spread() -> None:
     g = rng(6)
     rejected = [
