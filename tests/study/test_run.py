@@ -56,6 +56,21 @@ def start(path: Path, epochs: int, jobs: int = 2) -> subprocess.Popen[str]:
     )
 
 
+def run_script(script: str, folder: Path, timeout: float) -> subprocess.CompletedProcess[str]:
+    """A script in a process of its own, with the folder as its argument, to its end."""
+    path, root = folder / "script.py", Path(__file__).parents[2]
+    path.write_text(script)
+    return subprocess.run(
+        [sys.executable, str(path), str(folder)],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
 def wait_until(true: Callable[[], object], seconds: float = 120) -> None:
     deadline = time.monotonic() + seconds
     while not true():
@@ -169,17 +184,7 @@ def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) ->
             print(sorted(report.outcome for report in summary.reports.values()))
     """)
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    path, root = tmp_path / "cluster.py", Path(__file__).parents[2]
-    path.write_text(script)
-    done = subprocess.run(
-        [sys.executable, str(path), str(tmp_path)],
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
-        capture_output=True,
-        text=True,
-        timeout=400,
-        check=False,
-    )
+    done = run_script(script, tmp_path, timeout=400)
     assert "['finished', 'finished', 'finished']" in done.stdout, done.stdout + done.stderr
     folder = folder_in(tmp_path)
     for cell in cells_of(100):
@@ -207,17 +212,7 @@ def a_run(tmp_path: Path, body: str) -> str:
             summary = run.run_study(cells_of(1), folder_in(Path(sys.argv[1])), run.Settings(jobs=2))
             print(summary.signal, sorted(report.outcome for report in summary.reports.values()))
     """).replace("LINES", textwrap.dedent(body))
-    path, root = tmp_path / "script.py", Path(__file__).parents[2]
-    path.write_text(script)
-    done = subprocess.run(
-        [sys.executable, str(path), str(tmp_path)],
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
+    done = run_script(script, tmp_path, timeout=100)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
