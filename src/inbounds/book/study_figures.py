@@ -248,7 +248,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     words = ", ".join(filter(None, [remark, left_out(estimate)]))
     if words:
         ax.text(
-            0.5, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="center", va="bottom", fontsize=10,
+            0.99, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="right", va="bottom", fontsize=10,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )  # fmt: skip
 
