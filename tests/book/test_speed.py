@@ -48,13 +48,6 @@ def test_ratios_are_paired_and_the_floor_comes_last(results: Any) -> None:
     ]
 
 
-def test_rates_are_those_of_all_who_took_part(results: Any) -> None:
-    found = {row[0]: row[1:] for row in rows(speed.rate_table(results).html)}
-    assert found["In Bounds PPO, S = 10"] == ["50 (25 to 100)", "50 (25 to 100)"]
-    assert found["In Bounds PPO, S = 1"] == ["–", "33 (33 to 33)"]
-    assert len(found) == 5
-
-
 def test_the_circumstances_are_told(results: Any) -> None:
     html = speed.how_measured(results).html
     for words in (
@@ -79,8 +72,7 @@ def on_page(monkeypatch: pytest.MonkeyPatch) -> list[tuple[dict, dict]]:
 def test_what_was_not_measured_is_called_missing(tmp_path: Path, on_page: list) -> None:
     assert speed.read_speed(tmp_path) is None
     assert speed.read_validation(tmp_path) is None
-    for table in (speed.ratio_table, speed.rate_table):
-        assert "<code>make bench</code>" in table(None)._repr_html_()
+    assert "<code>make bench</code>" in speed.ratio_table(None)._repr_html_()
     assert "benchmarks.validate" in speed.verdict_table(None)._repr_html_()
     assert "Missing" in speed.how_measured(None)._repr_html_()
     speed.show_speed(None)
@@ -94,7 +86,7 @@ def test_the_stored_text_is_the_same_measured_or_not(results: Any, on_page: list
     speed.show_speed(results)
     speed.show_speed(None)
     assert on_page[0][0]["text/plain"] == on_page[1][0]["text/plain"]
-    for table in (speed.ratio_table, speed.rate_table, speed.how_measured):
+    for table in (speed.ratio_table, speed.how_measured):
         assert repr(table(results)) == repr(table(None))
     assert repr(speed.verdict_table(None)) == "<validation: verdicts>"
 

@@ -13,6 +13,7 @@ from scipy import stats
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Trainer, preset
 from inbounds.learning.files import DamagedFileError, write_whole
+from inbounds.learning.run_files import config_from, metadata_of
 from inbounds.learning.run_store import (
     COLUMNS,
     config_of,
@@ -215,3 +216,22 @@ def test_a_configuration_survives_its_file(algo: str, name: str, tmp_path: Path)
     trainer = saved_run(tmp_path, algo, name=name, epochs=1, seeds=[3, 5], **numbers)
     assert load_policy(tmp_path).config == trainer.config
     assert preset(name, algo=algo).policy != trainer.config.policy
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"format": 2}, "format 2: update inbounds"),
+        ({"config": {"gain": 2.0}}, r"inbounds 9\.9 wrote the file.*'gain'.*update inbounds"),
+        (
+            {"config": {"algorithm_name": "rocket"}},
+            r"inbounds 9\.9 wrote the file.*'rocket'.*update inbounds",
+        ),
+    ],
+)
+def test_a_file_of_another_version_says_so(change: dict, said: str) -> None:
+    metadata = json.loads(metadata_of(small_config(epochs=1)))
+    metadata["versions"]["inbounds"] = "9.9"
+    changed = metadata | change | {"config": metadata["config"] | change.get("config", {})}
+    with pytest.raises(ValueError, match=said):
+        config_from(changed)

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import warnings
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import pytest
 import torch
 
 from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, checkpoint, preset, train
-from inbounds.learning.files import DamagedFileError
+from inbounds.learning.files import DamagedFileError, held
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 
@@ -313,3 +314,31 @@ def test_presets_are_the_table() -> None:
 def test_bad_configurations_are_refused(wrong, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         wrong()
+
+
+def test_two_do_not_train_in_one_folder(tmp_path: Path) -> None:
+    config = small_config(epochs=1)
+    refused: list[str] = []
+
+    def intrude(*_: Any) -> None:
+        def other() -> None:
+            try:
+                train(config, run_dir=tmp_path, make_envs=PointEnv)
+            except BlockingIOError as error:
+                refused.append(str(error))
+
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+
+    pytest.importorskip("fcntl")
+    train(config, run_dir=tmp_path, make_envs=PointEnv, callback=intrude)
+    assert refused == [
+        f"another process or thread trains in {tmp_path}: wait until it is done, or choose another run_dir"
+    ]
+    intrude()  # the folder is free again, and the run in it done
+    assert len(refused) == 1
+    with held(tmp_path):  # who holds it may train in it
+        assert train(config, run_dir=tmp_path, make_envs=PointEnv).finished
+        intrude()  # and holds it still
+    assert len(refused) == 2

@@ -108,28 +108,6 @@ def ratio_table(results: Results | None) -> Shown:
     return Shown(what, table(caption, ["Who, over whom", *measured], rows))
 
 
-def rate_table(results: Results | None) -> Shown:
-    """Return env steps per second, a row per contestant and a column per robot: median and range."""
-    what = "speed: steps per second"
-    if results is None:
-        return _missing(what, NO_SPEED)
-    report, measured = _benchmarks("report"), results["measurements"]
-    names = list(dict.fromkeys(name for env in measured for name in measured[env]))
-    rows = [
-        [
-            _label(name),
-            *(
-                report.spread(report.steps_per_second(results, env, name), 0)
-                if name in measured[env]
-                else "–"
-                for env in measured
-            ),
-        ]
-        for name in names
-    ]
-    return Shown(what, table("Env steps per second: median (range).", ["Who", *measured], rows))
-
-
 def median_ratio(results: Results, env: str, ours: str, theirs: str) -> float:
     """Return the median over the repeats of one contestant's steps per second over another's.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
-import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +18,7 @@ from inbounds.cli.options import Train
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
 from inbounds.learning import TrainConfig, Trainer, checkpoint, train
-from inbounds.learning.files import DamagedFileError, is_disk_full
+from inbounds.learning.files import DamagedFileError, held, is_disk_full
 from inbounds.learning.rollout import check_environments
 from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
 from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
@@ -213,37 +212,22 @@ def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
 def _claimed(run_dir: Path) -> Iterator[None]:
     """Make the run directory and hold it, so that no second process trains in it at the same time."""
     new = [path for path in (run_dir, *run_dir.parents) if not path.exists()]
-    try:
-        run_dir.mkdir(parents=True, exist_ok=True)
-        held = _lock(run_dir)
-    except BlockingIOError as error:
-        raise CommandError(
-            f"another process trains in {run_dir}: wait until it is done, or choose another --out"
-        ) from error
-    except OSError as error:
-        said = "no room on the disk" if is_disk_full(error) else error.strerror
-        raise CommandError(f"{run_dir} cannot be a run directory ({said}): choose another --out") from error
-    try:
-        yield
-    finally:
-        for path in new:
-            with contextlib.suppress(OSError):  # something came of it
-                path.rmdir()
-        held.close()
-
-
-def _lock(directory: Path) -> contextlib.ExitStack:
-    """Lock a directory until the stack is closed or the process dies; raise BlockingIOError if another has it."""
-    held = contextlib.ExitStack()
-    try:
-        import fcntl
-    except ImportError:  # Windows has no such lock: there the user sees to it
-        return held
-    descriptor = os.open(directory, os.O_RDONLY)
-    held.callback(os.close, descriptor)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BaseException:
-        held.close()
-        raise
-    return held
+    with contextlib.ExitStack() as stack:
+        try:
+            run_dir.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(held(run_dir))
+        except BlockingIOError as error:
+            raise CommandError(
+                f"another process trains in {run_dir}: wait until it is done, or choose another --out"
+            ) from error
+        except OSError as error:
+            said = "no room on the disk" if is_disk_full(error) else error.strerror
+            raise CommandError(
+                f"{run_dir} cannot be a run directory ({said}): choose another --out"
+            ) from error
+        try:
+            yield
+        finally:
+            for path in new:
+                with contextlib.suppress(OSError):  # something came of it
+                    path.rmdir()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inbounds.book.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Watch
-from inbounds.learning.files import DamagedFileError, is_disk_full
+from inbounds.learning.files import is_disk_full
 from inbounds.learning.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.trained_policy import TrainedPolicy
 from inbounds.learning.training import make_environments
@@ -79,7 +79,7 @@ def _choose(command: Watch) -> TrainedPolicy:
         found = sorted(str(path.parent) for path in here.glob(f"*/{POLICIES_FILE}"))
         instead = f"choose one of {', '.join(found)}" if found else "train one first (inbounds train --help)"
         raise CommandError(f"there is no trained run in {command.run}: {instead}") from None
-    except DamagedFileError as error:
+    except ValueError as error:  # damaged, or of another version
         raise CommandError(str(error)) from error
     healthy = [str(i) for i, policy in enumerate(policies) if not policy.diverged]
     if not 0 <= command.seed_index < len(policies):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import secrets
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -99,3 +102,42 @@ def write_whole(path: Path, data: Any) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)  # on a full disk every byte counts
         raise
+
+
+_holders: dict[tuple[int, int], int] = {}
+"""Thread by device and inode of the directory that it holds."""
+
+
+@contextlib.contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Hold a directory, so that nobody else writes a run into it: no other process on this machine, no other thread.
+
+    A thread may hold again what it holds. The death of a process lets go of all that it held. On Windows, which has no
+    such lock, nothing is held: there the user sees to it.
+
+    Args:
+        directory: it must exist.
+
+    Raises:
+        BlockingIOError: somebody else holds it.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder, held(Path(folder)):
+        ...     write_whole(Path(folder) / "file", b"mine")
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        descriptor = os.open(directory, os.O_RDONLY)
+        stack.callback(os.close, descriptor)
+        state = os.fstat(descriptor)
+        place, thread = (state.st_dev, state.st_ino), threading.get_ident()
+        if _holders.get(place) != thread:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _holders[place] = thread
+            stack.callback(_holders.pop, place)
+        yield

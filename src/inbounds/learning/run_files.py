@@ -37,7 +37,7 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
         metadata: the parsed JSON.
 
     Raises:
-        ValueError: a later version of the package wrote it.
+        ValueError: another version of the package wrote it, with options that this one does not know.
 
     Example:
         >>> from inbounds.learning import preset
@@ -47,7 +47,18 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
     """
     if metadata["format"] > FORMAT:
         raise ValueError(f"the file has format {metadata['format']}: update inbounds to read it")
-    values = dict(metadata["config"])
+    try:
+        return _rebuilt(metadata["config"])
+    except (KeyError, TypeError) as error:
+        writer = metadata.get("versions", {}).get("inbounds", "unknown")
+        raise ValueError(
+            f"inbounds {writer} wrote the file, with a configuration that this version cannot read ({error}): "
+            "read it with that one, or update inbounds"
+        ) from error
+
+
+def _rebuilt(config: Mapping[str, Any]) -> TrainConfig:
+    values = dict(config)
     policy, network = dict(values["policy"]), dict(values["network"])
     algorithm = ALGORITHMS[values.pop("algorithm_name")][0]
     return TrainConfig(

@@ -126,6 +126,7 @@ def read_curves(run: str | Path) -> pa.Table:
     Raises:
         FileNotFoundError: there are none.
         DamagedFileError: the file is damaged.
+        ValueError: another version of the package wrote it, with options that this one does not know.
     """
     path = find(run, CURVES_FILE)
     try:
@@ -183,6 +184,7 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
     Raises:
         FileNotFoundError: there are none.
         DamagedFileError: the file is damaged.
+        ValueError: another version of the package wrote it, with options that this one does not know.
 
     Example:
         >>> import tempfile
@@ -218,6 +220,7 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
     Raises:
         FileNotFoundError: there is no such file.
         DamagedFileError: the file is damaged.
+        ValueError: another version of the package wrote it, with options that this one does not know.
         IndexError: the run has fewer seeds.
 
     Example:

@@ -29,6 +29,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from inbounds.learning import checkpoint
 from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.config import ALGORITHMS, TrainConfig
+from inbounds.learning.files import held
 from inbounds.learning.policies import Policy
 from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
@@ -204,6 +205,7 @@ def train(
     Raises:
         ValueError: the run directory belongs to another configuration, or its checkpoint is damaged
             (`DamagedFileError`).
+        BlockingIOError: another process or thread trains in the run directory.
         OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
 
     Example:
@@ -213,18 +215,26 @@ def train(
         (True, [False, False])
     """
     trainer = Trainer(config, make_envs)
-    path = None
-    if run_dir is not None:
-        Path(run_dir).mkdir(parents=True, exist_ok=True)
-        path = Path(run_dir) / checkpoint.FILE_NAME
-        if path.exists():
-            trainer.load_state_dict(checkpoint.load(path))
-    while not trainer.finished:
-        record = trainer.epoch()
-        if path is not None and (len(trainer.records) % config.checkpoint_every == 0 or trainer.finished):
-            checkpoint.save(path, trainer.state_dict())
-        if callback is not None:
-            callback(trainer, record)
+    with contextlib.ExitStack() as stack:
+        path = None
+        if run_dir is not None:
+            folder = Path(run_dir)
+            folder.mkdir(parents=True, exist_ok=True)
+            try:
+                stack.enter_context(held(folder))
+            except BlockingIOError as error:
+                raise BlockingIOError(
+                    f"another process or thread trains in {folder}: wait until it is done, or choose another run_dir"
+                ) from error
+            path = folder / checkpoint.FILE_NAME
+            if path.exists():
+                trainer.load_state_dict(checkpoint.load(path))
+        while not trainer.finished:
+            record = trainer.epoch()
+            if path is not None and (len(trainer.records) % config.checkpoint_every == 0 or trainer.finished):
+                checkpoint.save(path, trainer.state_dict())
+            if callback is not None:
+                callback(trainer, record)
     return trainer
 
 
