@@ -101,10 +101,20 @@ def resolve_public_name(
     return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", known[0], node, contnode)
 
 
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def as_prose(number: str) -> str:
-    """Return a formatted number with a real minus sign, and a narrow space between its thousands."""
-    grouped = re.sub(r"(?<=\d),(?=\d{3}(?!\d))", "\N{NARROW NO-BREAK SPACE}", number)
-    return re.sub(r"(?<![\w)\]])-(?=\d)", "\N{MINUS SIGN}", grouped)
+    """Return a formatted number as it is typed: real minus signs, powers of ten, narrow spaces in it and before %."""
+
+    def power(found: re.Match[str]) -> str:
+        mantissa = "" if found["mantissa"] == "1" else f"{found['mantissa']} · "
+        return f"{mantissa}10{str(int(found['exponent'])).translate(SUPERSCRIPT)}"
+
+    number = re.sub(r"(?<![\w.])(?P<mantissa>\d(\.\d+)?)e(?P<exponent>[+-]\d+)(?!\w)", power, number)
+    number = re.sub(r"(?<=\d)%", "\N{NARROW NO-BREAK SPACE}%", number)
+    number = re.sub(r"(?<=\d),(?=\d{3}(?!\d))", "\N{NARROW NO-BREAK SPACE}", number)
+    return re.sub(r"(?<![\w)\]])-(?=\d)", "\N{MINUS SIGN}", number)
 
 
 def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:

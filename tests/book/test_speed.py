@@ -139,7 +139,7 @@ def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
     assert ant[-1].startswith("not shown; with equal means 31 seeds")
     assert walker == ["Walker2d-v5", *same, "–", "–", "undecided: train longer"]
     assert "seeds a side (3 on Hopper-v5, 4 on Ant-v5, 3 on Walker2d-v5), 8,192 env steps" in html
-    assert "within ± 15%" in html
+    assert "within ± 15\N{NARROW NO-BREAK SPACE}%" in html
 
 
 def test_areas_above_the_start_do_not_depend_on_where_zero_is(tmp_path: Path) -> None:

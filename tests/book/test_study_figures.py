@@ -64,10 +64,7 @@ def test_every_panel_draws_the_curves_and_bands_it_was_given() -> None:
             assert outline[:, 1].min() == given.estimate.low.min()
             assert outline[:, 1].max() == given.estimate.high.max()
     said = words(fig)
-    assert (
-        "Line: mean. Band: 95 % bootstrap interval, at each epoch by itself. n = 10 seeds."
-        in said.replace("95%", "95 %")
-    )
+    assert "Line: mean. Band: 95 % bootstrap interval, at each epoch by itself. n = 10 seeds." in said
     for text in [
         "return",
         "env steps per seed [millions]",
@@ -111,13 +108,13 @@ def test_interval_panels_show_value_and_interval_in_the_familys_look() -> None:
             assert to_hex(markers[i].get_markerfacecolor()) == FAMILIES[family].color.lower()
             assert markers[i].get_ydata()[0] == i
             assert bars[i].get_linestyle() == "-", "a broken bar reads as another interval"
-    assert "Marker: IQM. Bar: 95% bootstrap interval. n = 10 seeds." in words(fig)
+    assert "Marker: IQM. Bar: 95 % bootstrap interval. n = 10 seeds." in words(fig)
     assert "unless" not in words(fig)
 
 
 def test_a_figure_of_few_seeds_says_that_its_intervals_fall_short() -> None:
     fig = study_figures.interval_panels({"Ant-v5": {"beta": estimate(scores(0)[:4])}})
-    assert "95% bootstrap interval (so few seeds cover 87.5% at most). n = 4 seeds." in words(fig)
+    assert "95 % bootstrap interval (so few seeds cover 87.5 % at most). n = 4 seeds." in words(fig)
 
 
 def test_a_panel_without_any_cell_has_no_scale() -> None:

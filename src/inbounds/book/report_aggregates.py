@@ -14,6 +14,7 @@ from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, REFERENCE
 from inbounds.study.grid import ARMS, ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.words import percent
 
 ALGORITHMS = ("ppo", "trpo")
 HEADS: Mapping[str, str] = {"final": "final return", "area": "area", "greedy": "greedy return"}
@@ -91,7 +92,7 @@ def _profiles(outcomes: Outcomes, title: str, columns: Mapping[str, Column]) -> 
     taus = np.linspace(low, high, 151)
     profiles = {f: analysis.profile(outcomes, c, "final", taus) for f, c in columns.items()}
     above = ", ".join(
-        f"{FAMILIES[f].label} {np.mean([np.mean(each > 1) for each in found.values()]):.0%}"
+        f"{FAMILIES[f].label} {percent(np.mean([np.mean(each > 1) for each in found.values()]))}"
         for f, found in scores.items()
         if found
     )

@@ -22,6 +22,7 @@ from inbounds.study.grid import ARMS, ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.words import percent
 
 TITLES: Mapping[str, str] = {
     "standard": "Arm 1: standard practice",
@@ -122,7 +123,7 @@ def endpoints(title: str, cells: Cells) -> list[str]:
             numbers = [spoken(analysis.estimate(outcome, e, s)) for e in ENDPOINTS for s in ("mean", "iqm")]
             counts = [str(len(outcome.diverged)), str(int(outcome.diverged.sum()))]
             rows.append([robot, FAMILIES[family].label, *counts, *numbers])
-    caption = f"Endpoints ({title}): over ten seeds, in brackets a {LEVEL:.0%} bootstrap interval."
+    caption = f"Endpoints ({title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval."
     alt = f"Final returns ({title}) with intervals, a panel per robot: {in_words(finals)}"
     return [html.figure(fig, alt, ""), html.table(caption, head, rows, words=(0, 1))]
 
@@ -147,7 +148,7 @@ def differences(outcomes: Outcomes, arm: str, algorithm: str, *, without_diverge
     which = ", without seeds that diverged" if without_diverged else ""
     caption = (
         f"Differences of means ({title_of(arm, algorithm)}{which}): in brackets "
-        f"a {LEVEL:.0%} bootstrap interval; p of a permutation test, corrected over the six robots (Holm). "
+        f"a {percent(LEVEL)} bootstrap interval; p of a permutation test, corrected over the six robots (Holm). "
         "Unresolved: the interval contains 0, which is no evidence of equality."
     )
     told = html.table(caption, head, rows, words=(0, 1, 4, 7, 10))

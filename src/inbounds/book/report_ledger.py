@@ -9,10 +9,11 @@ from inbounds.book import report_page as html
 from inbounds.study.ledger import Finding
 from inbounds.study.ledger.verdicts import STAYS
 from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.words import percent
 
 HEAD = ("claim", "verdict, test and result")
 _CAPTION = (
-    f"Claims, with what is for and against them. In brackets {LEVEL:.0%} bootstrap intervals over seeds; p of a "
+    f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds; p of a "
     "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible, or, not after "
     "Holm, the test does not find what it shows. Moot: there is nothing to explain. Exploratory: the protocol does not "
     "list such a number. Stays undecided: no missing cell can decide it."

@@ -15,6 +15,7 @@ from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.statistics import Comparison
 from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.words import percent
 
 THESIS: Mapping[tuple[str, str, str], str] = {
     ("ppo", "logit-normal", "gaussian"): "ahead on 2, little difference on 3, behind on 1",
@@ -74,7 +75,8 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
     caption = (
         "Differences of means that are found by at least one endpoint: the interval leaves out 0, and so does the "
         f"permutation test after Holm's correction over {len(ROBOTS)} robots, whose p is given. In brackets a "
-        f"{LEVEL:.0%} bootstrap interval. Final return and area are primary endpoints, the greedy return is secondary."
+        f"{percent(LEVEL)} bootstrap interval. Final return and area are primary endpoints, the greedy return is "
+        "secondary."
     )
     return [html.table(caption, ["difference", *HEADS.values()], rows, range(4))]
 

@@ -27,6 +27,7 @@ import numpy as np
 from inbounds.book import alt_text
 from inbounds.book.report_page import bullets, paragraph, table
 from inbounds.book.shown import Shown
+from inbounds.study.words import percent
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py
 RESULTS = ROOT / "benchmarks" / "results"
@@ -157,7 +158,7 @@ def verdict_table(validation: Results | None) -> Shown:
         who.PEER,
         "ratio (90 % interval)",
         "p",
-        f"within ± {validation['margin']:.0%}",
+        f"within ± {percent(validation['margin'])}",
     ]
     rows = [[env, *_verdict(found, who)] for env, found in validation["verdicts"].items()]
     seeds = ", ".join(f"{count} on {env}" for env, count in validation["seeds"].items())

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from inbounds.book.figures import FAMILIES, WIDTH, family_style
 from inbounds.study.statistics import Estimate
+from inbounds.study.words import percent
 
 SMALL = 11.0
 """Font size of notes, in points."""
@@ -101,8 +102,10 @@ def note(fig: Figure, mark: str, band: str, drawn: list[Estimate], where: str, r
             f" n = {seeds} seeds{' unless noted' if any(e.missing for e in drawn) else ''}." if seeds else ""
         )
         short = min((estimate.ceiling for estimate in drawn), default=1.0)
-        limit = f" (so few seeds cover {short:.1%} at most)" if short < level else ""
-        text = f"{mark}: {statistic}. {band}: {level:.0%} bootstrap interval{where}{limit}.{count} {remark}"
+        limit = f" (so few seeds cover {percent(short, 1)} at most)" if short < level else ""
+        text = (
+            f"{mark}: {statistic}. {band}: {percent(level)} bootstrap interval{where}{limit}.{count} {remark}"
+        )
     # A legend of nothing but its title: the layout engine keeps room for it below the panels.
     fig.legend(
         handles=[], title=textwrap.fill(text.strip(), 80), title_fontsize=SMALL, loc="outside lower left"

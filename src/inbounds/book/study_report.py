@@ -25,12 +25,13 @@ from inbounds.study.ledger import CLAIMS, judge
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate
 from inbounds.study.statistics.settings import LEVEL, RESAMPLES
+from inbounds.study.words import percent
 
 HOW_TO_READ = (
     "A cell is one algorithm × family × variant × robot, ten seeds. The unit of analysis is the seed: n counts seeds.",
-    f"Bars and bands are {LEVEL:.0%} intervals over seeds (expanded percentile bootstrap, {RESAMPLES} resamples); a "
-    "curve's band holds at each epoch by itself, and over all robots the plain percentile interval is taken. They say "
-    "what other seeds would have given, nothing about other robots.",
+    f"Bars and bands are {percent(LEVEL)} intervals over seeds (expanded percentile bootstrap, {RESAMPLES} resamples); "
+    "a curve's band holds at each epoch by itself, and over all robots the plain percentile interval is taken. They "
+    "say what other seeds would have given, nothing about other robots.",
     "Differences are between families within an algorithm. p-values are of permutation tests, corrected over the six "
     "robots (Holm). An interval that contains 0 is unresolved: ten seeds a side find differences of about 1.3 standard "
     "deviations.",
@@ -126,7 +127,7 @@ def _mechanisms(outcomes: Outcomes) -> list[str]:
     parts = [html.heading(TITLES["mechanisms"], 2, "mechanisms")]
     said = (
         "Each cell differs in one thing from a cell of arm 1 (or 3), with which it is compared: difference of means, "
-        f"with a {LEVEL:.0%} bootstrap interval, robot by robot, without a test and without a claim over robots."
+        f"with a {percent(LEVEL)} bootstrap interval, robot by robot, without a test and without a claim over robots."
     )
     parts.append(html.paragraph(said))
     for word, title in GROUPS.items():
@@ -211,6 +212,6 @@ def _cost(found: list[Outcome]) -> str:
     training, evaluation = seconds["training"], seconds["evaluation"] + seconds["final evaluation"]
     rest = seconds["total"] - training - evaluation
     return (
-        f"Engine: {training / 3600:.1f} h of wall time; evaluation {evaluation / training:.1%} of that, "
-        f"the runner itself {rest / training:.1%}."
+        f"Engine: {training / 3600:.1f} h of wall time; evaluation {percent(evaluation / training, 1)} of that, "
+        f"the runner itself {percent(rest / training, 1)}."
     )

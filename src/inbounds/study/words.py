@@ -28,6 +28,16 @@ def number(value: float | np.ndarray) -> str:
     return _minus(f"{float(value):z.0f}" if abs(float(value)) >= 100 else f"{float(value):z.1f}")
 
 
+def percent(share: float, digits: int = 0) -> str:
+    """Say a share in per cent, as the book's prose writes it, never broken before its sign.
+
+    Example:
+        >>> percent(0.95).split()
+        ['95', '%']
+    """
+    return f"{_minus(f'{100 * share:z.{digits}f}')}\N{NARROW NO-BREAK SPACE}%"
+
+
 def p_value(p: float) -> str:
     """Say a p-value."""
     return "" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
