@@ -52,7 +52,8 @@ def test_the_variants_are_those_of_the_protocol() -> None:
         variants = re.findall(r"`([^`]+)`", cells[1])
         assert sum(cell.variant in variants for cell in ARMS["mechanisms"]) == int(cells[5])
         named |= dict.fromkeys(variants)
-    assert named.keys() == VARIANTS.keys() - {""}
+    asked_later = {cell.variant for cell in AFTERWARDS}
+    assert named.keys() | asked_later == VARIANTS.keys() - {""}
 
 
 def test_the_numbers_of_the_analysis_are_those_of_the_protocol() -> None:
@@ -114,6 +115,7 @@ def test_printed_cells_are_the_preset() -> None:
 def test_a_variant_changes_one_thing(variant: str) -> None:
     changed = {
         "matched-noise": "policy.initial_std",
+        "loud-noise": "policy.initial_std",
         "raw-cost": "action_mode",
         "gamma-0.9999": "algorithm.gamma",
         "printed-clip": "algorithm.clip_range",

@@ -153,7 +153,7 @@ def afterwards(outcomes: Outcomes) -> list[str]:
     both = outcomes.and_of(AFTERWARDS)
     if not any(cell.id in both.finished for cell in AFTERWARDS):
         return [NONE_FINISHED]
-    return _changes(both, "Matched initial noise, asked afterwards", AFTERWARDS)
+    return _changes(both, "Initial noise, asked afterwards", AFTERWARDS)
 
 
 def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
