@@ -158,21 +158,27 @@ def afterwards(outcomes: Outcomes) -> list[str]:
 
 def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
     panels: dict[str, dict[str, Estimate | None]] = {}
-    rows = []
+    names, rows = [], []
     for cell in cells:
         outcome = outcomes.finished.get(cell.id)
         found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
         panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
-        label = FAMILIES[cell.family].label
-        rows.append([cell.robot, cell.algorithm.upper(), label, cell.variant, *map(spoken, found.values())])
+        names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
+        rows.append([spoken(estimate) for estimate in found.values()])
     fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
         for panel, row in panels.items()
     )
-    head = ["robot", "algorithm", "family", "variant", *HEADS.values()]
-    caption = f"{title}: changed cell minus cell of comparison; missing where either is not finished."
-    return [html.figure(fig, alt, ""), html.table(caption, head, rows, (0, 1, 2, 3))]
+    # What all rows share is said once, in the caption: the table is wide enough.
+    columns = dict(zip(("robot", "algorithm", "family", "variant"), zip(*names, strict=True), strict=True))
+    shared = [column[0] for column in columns.values() if len(set(column)) == 1]
+    told = {name: column for name, column in columns.items() if len(set(column)) > 1}
+    where = f"{title} ({', '.join(shared)})" if shared else title
+    caption = f"{where}: changed cell minus cell of comparison; missing where either is not finished."
+    table = [[*name, *row] for name, row in zip(zip(*told.values(), strict=True), rows, strict=True)]
+    head = [*told, *HEADS.values()]
+    return [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
 
 
 def _panel(cell: Cell) -> str:
