@@ -99,14 +99,15 @@ def ratio_table(results: Results | None) -> Shown:
         there = [{ours, theirs} <= measured[env].keys() for env in measured]
         if any(there):
             cells = [
-                report.spread(report.ratio(results, env, ours, theirs)) if has else "–"
+                report.spread(report.ratio(results, env, ours, theirs)).replace(" (", "\n(") if has else "–"
                 for env, has in zip(measured, there, strict=True)
             ]
-            rows.append([f"{_label(ours)}, over {_label(theirs)}", *cells])
+            rows.append([f"{_label(ours)},\nover {_label(theirs)}", *cells])
     caption = (
         f"Steps per second, ratios: median (range) of {results['repeats']} interleaved repeats on one core."
     )
-    return Shown(what, table(caption, ["Who, over whom", *measured], rows))
+    robots = [env.partition("-")[0] for env in measured]
+    return Shown(what, table(caption, ["Who, over whom", *robots], rows))
 
 
 def median_ratio(results: Results, env: str, ours: str, theirs: str) -> float:
