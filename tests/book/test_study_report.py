@@ -23,7 +23,7 @@ from tests.study.synthetic import write_cells
 
 
 class Page(HTMLParser):
-    """What a page holds: rows of its tables by caption, texts of its images, headings, addresses."""
+    """What a page holds: rows of its tables by caption, texts of its images, headings, addresses, items."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -32,6 +32,7 @@ class Page(HTMLParser):
         self.headings: list[str] = []
         self.addresses: list[str] = []
         self.missing: list[str] = []
+        self.items: list[str] = []
         self.open: list[str] = []
         self.caption = ""
         self.feed(text)
@@ -64,6 +65,8 @@ class Page(HTMLParser):
             self.tables[self.caption][-1][-1] += data
         elif here in ("h1", "h2", "h3"):
             self.headings.append(data)
+        elif here == "li":
+            self.items.append(data)
         elif here == "p" and self.set_back:
             self.missing.append(data)
 
@@ -112,7 +115,10 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     assert len(rows) == 1 + 3 * 6
     assert all(row[2:] == ["missing", "", ""] * 3 for row in page.table("Differences of means (PPO")[1:])
     assert any("aggregates need all six robots" in text for text in page.missing)
-    assert page.table("What the cells ran on")[1][0] == "1"
+    ran_on = page.table("What the cells ran on")
+    assert ran_on[1][::3] == ["1", "1"]  # one part, on the first machine of the list
+    processor = outcome.metadata["sessions"][0]["processor"]
+    assert any(text.startswith("1: ") and text.endswith(f"; {processor}") for text in page.items)
 
 
 def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:

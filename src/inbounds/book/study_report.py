@@ -194,17 +194,21 @@ def provenance_section(outcomes: Outcomes) -> list[str]:
     if not outcomes.finished:
         return [html.paragraph("missing: no cell is finished.", "missing")]
     parts = Counter(_ran_on(part) for o in outcomes.finished.values() for part in o.metadata["sessions"])
-    rows = [[str(count), *key] for key, count in parts.items()]
-    head = ["parts", "commit", "engine", "versions", "processor"]
+    # Versions and processor are long, and few: each pair has a number, which a list below the table explains.
+    used = Counter(ran[2:] for ran in parts.elements())
+    place = {pair: str(number) for number, (pair, _) in enumerate(used.most_common(), 1)}
+    rows = [[str(count), *key[:2], place[key[2:]]] for key, count in parts.items()]
     caption = (
         "What the cells ran on. A cell that was stopped and resumed has several parts; + after a commit: the engine "
-        "differed from it."
+        "differed from it. Machines, with their versions, are listed below."
     )
+    where = html.bullets(f"{number}: {'; '.join(pair)}" for pair, number in place.items())
     cost = html.paragraph(_cost(list(outcomes.finished.values())))
-    return [html.table(caption, head, rows, (1, 2, 3, 4)), cost]
+    return [html.table(caption, ["parts", "commit", "engine", "machine"], rows, (1, 2, 3)), where, cost]
 
 
-def _ran_on(part: dict[str, object]) -> tuple[str, ...]:
+def _ran_on(part: dict[str, object]) -> tuple[str, str, str, str]:
+    """Return commit, engine, versions and processor of a part."""
     versions = part["versions"]
     assert isinstance(versions, dict)
     said = ", ".join(f"{name} {version}" for name, version in versions.items())
