@@ -34,7 +34,7 @@ CAUSES = [
         "cause-capg",
         _CAUSE,
         "What hurts the Gaussian is that its objective ignores the clipping.",
-        "ch. 1; ch. 6, 1st paragraph",
+        "this book's reading of ch. 1 and of ch. 6, 1st paragraph",
         "Final return: CAPG, which takes the clipping into account, gains at least half of what the "
         "logit-normal gains, on every robot on which that gains.",
         half_remains(
@@ -148,8 +148,8 @@ TRUST = [
     Claim(
         "beta-trpo",
         _TRUST,
-        "TRPO cannot be run with a Beta policy.",
-        "ch. 4; ch. 5, TRPO",
+        "TRPO is not practicable with a Beta policy.",
+        "ch. 1; ch. 4; ch. 5, TRPO",
         "Final return − first epoch's, seed by seed: above 0 on any robot counts against.",
         learns(Column("beyond", "trpo", "beta"), sign=-1),
         cells("beyond", "trpo", "beta"),
