@@ -17,7 +17,8 @@ def outcome(cell: Cell, level: float) -> Outcome:
     returns = level + np.linspace(-5, 5, 10)[:, None] + np.zeros(50)
     never = np.zeros(10, np.bool_)
     steps = 2048.0 * np.arange(1, 51)
-    return Outcome(cell, steps, returns, returns[:, :5], never, {}, {}, {})
+    episodes = np.full_like(returns, 2.0)
+    return Outcome(cell, steps, returns, returns[:, :5], never, {}, {}, {}, episodes, {})
 
 
 def find(arm: str, robot: str, family: str, variant: str = "") -> Cell:

@@ -1,16 +1,18 @@
 """The analysis is the protocol's: endpoints, comparisons, references; what is missing stays missing."""
 
+import dataclasses
 import re
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from scipy import stats
 
 from inbounds.study import StudyFolder, analysis, read_cell
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, REFERENCE, Contrast
 from inbounds.study.grid import ROBOTS, select, study_cells
-from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.outcomes import Column, Outcome, Outcomes
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
@@ -228,3 +230,36 @@ def test_a_cell_that_is_not_whole_is_named_and_not_used(folder: StudyFolder, tmp
     found = Outcomes.read(few, cells)
     assert found.states[cells[0].id] == "damaged"
     assert list(found.finished) == [cell.id for cell in cells[1:]]
+
+
+def test_a_pace_is_what_the_epochs_add_up_to() -> None:
+    """Ten epochs of a hundred steps, two seeds: counted by hand."""
+    episodes = np.array([[2.0] * 5 + [1.0] * 5, [0.0] * 5 + [4.0] * 5])
+    returns = np.array([[30.0] * 5 + [80.0] * 5, [np.nan] * 5 + [5.0] * 5])
+    outcome = dataclasses.replace(
+        outcome_of_nothing(), steps=100.0 * np.arange(1, 11), returns=returns, episodes=episodes
+    )
+    pace = outcome.pace(5)
+    np.testing.assert_allclose(pace.steps, [[50.0, 100.0], [np.inf, 25.0]])
+    np.testing.assert_allclose(pace.reward, [[0.6, 0.8], [0.0, 0.2]])
+    whole = outcome.pace(10)
+    np.testing.assert_allclose(whole.steps[:, 0], [1000 / 15, 1000 / 20])
+    np.testing.assert_allclose(whole.reward[:, 0], [700 / 1000, 100 / 1000])
+    for block in (3, 0):
+        with pytest.raises(ValueError, match="choose a divisor of 10"):
+            outcome.pace(block)
+
+
+def outcome_of_nothing() -> Outcome:
+    cell, *_ = select(["standard-hopper-ppo-beta"])
+    empty = np.empty((0, 0))
+    return Outcome(cell, np.empty(0), empty, empty, np.empty(0, np.bool_), {}, {}, {}, empty, {})
+
+
+def test_final_policies_have_lengths_by_their_way_to_act(outcomes: Outcomes) -> None:
+    outcome = outcomes.finished["standard-hopper-ppo-beta"]
+    assert list(outcome.lengths) == list(outcome.ways)
+    assert all(lengths.shape == (10,) for lengths in outcome.lengths.values())
+    table = pq.read_table(outcomes.folder.policy_files(outcome.cell)[1]).to_pylist()
+    by_hand = [row["length"] for row in table if row["greedy"] == "mode" and row["seed"] == 3]
+    assert outcome.lengths["mode"][3] == pytest.approx(np.mean(by_hand))

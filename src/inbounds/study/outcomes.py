@@ -52,6 +52,18 @@ class Column(NamedTuple):
         return Column("standard" if first else "beyond", self.algorithm, self.family)
 
 
+class Pace(NamedTuple):
+    """How long episodes last and what a step earns, in blocks of epochs.
+
+    Made by `Outcome.pace`, which has an example.
+    """
+
+    steps: Floats
+    """`[S, B]` env steps per episode that ended; infinite where none did."""
+    reward: Floats
+    """`[S, B]` reward per env step, undiscounted."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a finished cell left.
@@ -79,6 +91,10 @@ class Outcome:
     """What the cell's file says of itself."""
     ways: Mapping[str, Floats]
     """`[S]` mean return of the final policies by way to act (mean, median, mode, sample), where they were kept."""
+    episodes: Floats
+    """`[S, E]` episodes that ended within each epoch."""
+    lengths: Mapping[str, Floats]
+    """`[S]` mean length of the final policies' episodes by way to act [env steps], where they were kept."""
 
     @classmethod
     def of(
@@ -108,14 +124,45 @@ class Outcome:
             diverged=np.asarray(by_seed("diverged").any(1), np.bool_),
             measured=measured,
             metadata=metadata,
-            ways={} if returns is None else _ways(returns, seeds),
+            ways={} if returns is None else _by_way(returns, "return", seeds),
+            episodes=by_seed("episodes").astype(np.float64),
+            lengths={} if returns is None else _by_way(returns, "length", seeds),
         )
 
+    def pace(self, block: int) -> Pace:
+        """Take the return of training apart, block by block of epochs.
 
-def _ways(returns: pa.Table, seeds: int) -> dict[str, Floats]:
-    """Mean returns `[S]` by way to act; rows go way by way, seed by seed, episode by episode."""
-    names = returns["greedy"].to_pylist()
-    values = returns["return"].to_numpy()
+        Episodes are counted where they end: what the one that is under way has earned counts in the next block.
+
+        Args:
+            block: epochs in a block; the number of epochs is a multiple of it.
+
+        Raises:
+            ValueError: it is not.
+
+        Example:
+            >>> from inbounds.study.store import StudyFolder
+            >>> outcome = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
+            >>> pace = outcome.pace(50)
+            >>> pace.steps.shape, bool((pace.steps[:, -1] > pace.steps[:, 0]).all())  # it learns to stay up
+            ((10, 10), True)
+        """
+        seeds, epochs = self.episodes.shape
+        if block < 1 or epochs % block:
+            raise ValueError(
+                f"blocks of {block} epochs do not make up {epochs}; choose a divisor of {epochs}"
+            )
+        earned = self.episodes * np.where(self.episodes > 0, self.returns, 0.0)  # [S, E]
+        steps = np.diff(self.steps, prepend=0.0).reshape(-1, block).sum(-1)  # [B], of each seed
+        ended, total = (each.reshape(seeds, -1, block).sum(-1) for each in (self.episodes, earned))  # [S, B]
+        with np.errstate(divide="ignore"):
+            return Pace(steps=steps / ended, reward=total / steps)
+
+
+def _by_way(episodes: pa.Table, column: str, seeds: int) -> dict[str, Floats]:
+    """Means `[S]` of a column by way to act; rows go way by way, seed by seed, episode by episode."""
+    names = episodes["greedy"].to_pylist()
+    values = episodes[column].to_numpy()
     return {
         way: values[[name == way for name in names]].reshape(seeds, -1).mean(1)
         for way in dict.fromkeys(names)

@@ -1,0 +1,95 @@
+"""Means over seeds with their intervals, as chapters 15 to 17 write them beside the tables of the protocol.
+
+The numbers that `results/PROTOCOL.md` lists have generators of their own (`inbounds.study.analysis`). What the chapters
+look at besides is exploratory, and each of its intervals is resampled from seed 0, so that it is the same tomorrow.
+
+    mean_of(scores(outcome, "final"))
+    minus(scores(first, "final"), scores(second, "final"))
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inbounds.book import figures
+from inbounds.learning import TrainedPolicy, load_policy
+from inbounds.study.ledger.evidence import combination
+from inbounds.study.outcomes import Outcome, Outcomes
+from inbounds.study.statistics import Estimate, bootstrap
+
+BAND_RESAMPLES = 1000
+"""Of a curve's band, which nobody reads to the last digit."""
+
+
+def mean_of(values: ArrayLike) -> Estimate:
+    """Return the mean over seeds of numbers `[S]`, with its interval.
+
+    Example:
+        >>> mean_of([1.0, 2.0, 3.0]).value.item()
+        2.0
+    """
+    return bootstrap(np.asarray(values, np.float64), np.random.default_rng(0), statistic="mean")
+
+
+def minus(first: ArrayLike, second: ArrayLike) -> Estimate:
+    """Return the difference of the means of two independent groups of seeds, with its interval.
+
+    Example:
+        >>> minus([2.0, 3.0, 4.0], [1.0, 1.0, 4.0]).value.item()
+        1.0
+    """
+    groups = [np.asarray(each, np.float64) for each in (first, second)]
+    return combination(groups, [1, -1], np.random.default_rng(0))
+
+
+def draw(ax: Any, family: str, values: ArrayLike, x: ArrayLike | None = None, **changed: Any) -> None:
+    """Draw a mean over seeds with its 95 % band, in a family's look.
+
+    Args:
+        ax: where to.
+        family: whose look.
+        values: `[S, K]`.
+        x: `[K]`; None is where the study measures, the first epoch and every tenth.
+        **changed: of the look, as `matplotlib.axes.Axes.plot` takes it.
+
+    Example:
+        >>> import matplotlib.pyplot as plt
+        >>> fig, ax = plt.subplots()
+        >>> draw(ax, "beta", np.random.default_rng(0).normal(size=(10, 3)), [1, 2, 3])
+        >>> len(ax.lines), len(ax.collections)
+        (1, 1)
+        >>> plt.close(fig)
+    """
+    values = np.asarray(values, np.float64)
+    places = np.array([1, *range(10, 10 * values.shape[1], 10)]) if x is None else np.asarray(x)
+    found = bootstrap(values, np.random.default_rng(0), statistic="mean", resamples=BAND_RESAMPLES)
+    look = figures.family_style(family) | changed
+    ax.fill_between(places, found.low, found.high, alpha=0.18, color=look["color"])
+    ax.plot(places, found.value, **look)
+
+
+def final_policies(outcomes: Outcomes, outcome: Outcome) -> list[TrainedPolicy]:
+    """Load the final policies of all seeds of a cell.
+
+    Args:
+        outcomes: where the cell was found.
+        outcome: of the cell.
+
+    Raises:
+        FileNotFoundError: the cell is of an arm that keeps no policies.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
+        >>> policies = final_policies(outcomes, outcomes.finished["standard-hopper-ppo-beta"])
+        >>> [policy.seed for policy in policies] == list(range(10))
+        True
+    """
+    cell = outcome.cell
+    if not cell.keeps_policies:
+        raise FileNotFoundError(f"{cell.id}: arm {cell.arm} keeps no policies, only curves and measurements")
+    file = outcomes.folder.policy_files(cell)[0]
+    return [load_policy(file, index) for index in range(len(cell.seeds))]
