@@ -426,6 +426,20 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/study/test_cell_run.py::test_rows_end_with_the_epoch_in_which_a_seed_diverged",
     ),
     Mutant(
+        "a pace divides a block's steps by an epoch's episodes",
+        "study/outcomes.py",
+        "ended, total = (each.reshape(seeds, -1, block).sum(-1) for each in (self.episodes, earned))",
+        "ended, total = (each.reshape(seeds, -1, block).mean(-1) for each in (self.episodes, earned))",
+        "tests/study/test_analysis.py::test_a_pace_is_what_the_epochs_add_up_to",
+    ),
+    Mutant(
+        "lengths are returns",
+        "study/outcomes.py",
+        'lengths={} if returns is None else _by_way(returns, "length", seeds),',
+        'lengths={} if returns is None else _by_way(returns, "return", seeds),',
+        "tests/study/test_analysis.py::test_final_policies_have_lengths_by_their_way_to_act",
+    ),
+    Mutant(
         "rows that are NaN now are not compared",
         "study/verify.py",
         "if a != b and not (a != a and b != b):",
