@@ -155,6 +155,8 @@ THESIS = (
 )
 """The five columns of the source thesis."""
 BEYOND = (("trpo", "beta"), ("ppo", "clipped-gaussian"), ("trpo", "clipped-gaussian"))
+LOOKED_INTO = ("matched-noise", f"gamma-{LONG_GAMMA}")
+"""Variants of the fourth arm whose final policies are kept: the book looks at how their robots move."""
 FAMILIES = ("gaussian", "beta", "logit-normal")
 
 
@@ -171,7 +173,7 @@ def _mechanisms() -> list[Cell]:
         (printed, ["ppo"], ["gaussian", "logit-normal"], ["HalfCheetah", "Hopper"]),
     ]
     return [
-        Cell("mechanisms", algorithm, family, robot, variant)
+        Cell("mechanisms", algorithm, family, robot, variant, keeps_policies=variant in LOOKED_INTO)
         for variants, algorithms, families, robots in plan
         for variant in variants
         for algorithm in algorithms
@@ -195,7 +197,7 @@ ARMS: Mapping[str, tuple[Cell, ...]] = MappingProxyType(
     {
         "standard": _by_robot(_columns("standard", THESIS, keeps_policies=True)),
         "printed": _by_robot(_columns("printed", THESIS, preset="as-printed")),
-        "beyond": _by_robot(_columns("beyond", BEYOND)),
+        "beyond": _by_robot(_columns("beyond", BEYOND, keeps_policies=True)),
         "mechanisms": _by_robot(_mechanisms()),
     }
 )
