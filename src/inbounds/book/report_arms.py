@@ -243,6 +243,7 @@ def ways(outcomes: Outcomes, arm: str) -> list[str]:
         for o in kept
     ]
     caption = (
-        "Final policies by way to act: mean return of ten episodes per seed from the same starts, over seeds."
+        f"Final policies by way to act ({TITLES[arm].partition(': ')[2]}): "
+        "mean return of ten episodes per seed from the same starts, over seeds."
     )
     return [html.table(caption, ["robot", "algorithm", "family", *names], rows, (0, 1, 2))]

@@ -183,7 +183,8 @@ class Swimmer(Task):
                                                                                          gear in N·m
     obs 0         heading of the front link                                              rad
     obs 1–2       joint angles                                                           rad
-    obs 3–4       velocity of the front link along x and y                               m/s
+    obs 3–4       velocity, along x and y, of the point that is paid: on the front       m/s
+                  link's line, 0.5 m behind the first joint
     obs 5         turning rate of the front link                                         rad/s
     obs 6–7       joint rates                                                            rad/s
     reward        dx/dt − 0.0001 · ‖action‖²                                             1 per step
