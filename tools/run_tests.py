@@ -1,11 +1,13 @@
 """`make test`: pytest on the package and the book, then nbval on the notebooks; one summary, non-zero on any failure.
 
     python tools/run_tests.py [NOTEBOOK ...]    with notebooks named, only nbval on those
+    python tools/run_tests.py --cell-timeout 30 NOTEBOOK ...    and no cell may take longer than that [s]
 
 A test that was skipped or expected to fail did not pass: nbval marks the cells after a dead kernel as expected
 failures, and would otherwise end in green.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -18,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PARALLEL = ["-n", "2", "--dist", "loadscope"]
 PACKAGE = ["-m", "not pages", *PARALLEL, "tests"]
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
-NOTEBOOKS = ["-p", "tests.nbval_rules", "--nbval", "--nbval-cell-timeout=240", *PARALLEL]
+NOTEBOOKS = ["-p", "tests.nbval_rules", "--nbval", *PARALLEL]
 
 
 def run(label: str, arguments: list[str]) -> tuple[str, int]:
@@ -43,10 +45,24 @@ def run(label: str, arguments: list[str]) -> tuple[str, int]:
 
 
 def main() -> int:
-    named = sys.argv[1:]
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("notebooks", nargs="*", metavar="NOTEBOOK")
+    parser.add_argument(
+        "--cell-timeout",
+        type=int,
+        default=240,
+        metavar="SECONDS",
+        help="after which a cell of a notebook fails",
+    )
+    options = parser.parse_args()
+    named = options.notebooks
     notebooks = named or sorted(str(path) for path in (ROOT / "notebooks").glob("*.ipynb"))
     outcomes = [] if named else [run("package and book", PACKAGE)]
-    outcomes.append(run("notebooks", [*NOTEBOOKS, *notebooks]))
+    outcomes.append(
+        run("notebooks", [*NOTEBOOKS, f"--nbval-cell-timeout={options.cell_timeout}", *notebooks])
+    )
     print("\n── summary", *(line for line, _ in outcomes), sep="\n")
     return 1 if any(bad for _, bad in outcomes) else 0
 
