@@ -7,7 +7,7 @@ SHELL := /bin/bash
 PY := .venv/bin/python
 # Seeds in lockstep are one program on one core: more threads only make it slower (CONTRIBUTING.md, "Speed").
 export OMP_NUM_THREADS ?= 1
-NB ?= $(wildcard notebooks/[0-9]*.ipynb)
+NB ?= $(wildcard notebooks/*.ipynb)
 PORT ?= 8000
 
 .PHONY: help setup book test check format notebooks pages serve lab bench dist clean distclean

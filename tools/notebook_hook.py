@@ -14,8 +14,8 @@ from pathlib import Path
 import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
-QUOTED = re.compile(r"\{glue:?\w*\}`([^`:]+)")
-"""The name in a glue role of MyST."""
+QUOTED = re.compile(r"\{glue:?\w*\}`(?:([^`:]+\.ipynb)::)?([^`:]+)")
+"""The notebook, where it is another one, and the name in a glue role of MyST."""
 LIGHT = ("text/plain", "application/papermill.record/text/plain")
 METADATA = {
     "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
@@ -56,20 +56,24 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
     return found
 
 
-def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
-    """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
-    glued = {
+def glued(notebook: nbformat.NotebookNode) -> set[str]:
+    """The names of all values that a notebook glues."""
+    return {
         output.metadata["scrapbook"]["name"]
         for cell in notebook.cells
         for output in cell.get("outputs", [])
         if "scrapbook" in output.get("metadata", {})
     }
+
+
+def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
+    """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
     return [
-        f"cell {number}: quotes {name!r}, which no cell glues"
+        f"cell {number}: quotes {name!r}, which no cell{f' of {other}' if other else ''} glues"
         for number, cell in enumerate(notebook.cells)
         if cell.cell_type == "markdown"
-        for name in QUOTED.findall(cell.source)
-        if name not in glued
+        for other, name in QUOTED.findall(cell.source)
+        if name not in glued(nbformat.read(ROOT / "notebooks" / other, 4) if other else notebook)
     ]
 
 

@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 REFERENCE_PAGES = {
+    # What the book found, for who has two minutes. Its numbers are glued, and its claims asserted where they are made.
+    "front_page",
     # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
     # every entry must have its own check (`test_every_erratum_is_checked`).
     "19_errata",

@@ -8,7 +8,7 @@ The text form of what is shown holds no number: a stored notebook stays the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -137,12 +137,27 @@ def films(outcomes: Outcomes, robot: str, algorithm: str = "ppo", seconds: float
     """
     columns = columns_of("standard", algorithm)
     found = {f: outcome for f, c in columns.items() if (outcome := outcomes.find(c, robot)) is not None}
-    shown = {_caption(o): _film(outcomes, o, seconds) for o in found.values()}
-    parts = [show_films(shown)._repr_html_()] if shown else []
+    parts = _side_by_side(outcomes, {FAMILIES[f].label: o for f, o in found.items()}, seconds)
     lacking = [FAMILIES[family].label for family in columns if family not in found]
     if lacking:
         parts.append(html.paragraph(f"missing, not finished: {', '.join(lacking)}.", "missing"))
     return _shown(f"films: {robot}, {algorithm.upper()}, one per family", parts)
+
+
+def compare(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float = 4.0) -> Shown:
+    """Return films of chosen cells' final policies, as `films` shows those of one robot.
+
+    Args:
+        outcomes: where the cells were found.
+        chosen: caption → cell; each must keep its policies.
+        seconds: of each film.
+    """
+    return _shown(f"films: {', '.join(chosen)}", _side_by_side(outcomes, chosen, seconds))
+
+
+def _side_by_side(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float) -> list[str]:
+    shown = {_caption(name, o): _film(outcomes, o, seconds) for name, o in chosen.items()}
+    return [show_films(shown)._repr_html_()] if shown else []
 
 
 def middle_seed(outcome: Outcome) -> int:
@@ -151,9 +166,9 @@ def middle_seed(outcome: Outcome) -> int:
     return int(np.argsort(returns, kind="stable")[(np.isfinite(returns).sum() - 1) // 2])
 
 
-def _caption(outcome: Outcome) -> str:
+def _caption(name: str, outcome: Outcome) -> str:
     seed = middle_seed(outcome)
-    return f"{FAMILIES[outcome.cell.family].label}, seed {outcome.cell.seeds[seed]}: {outcome.ways['median'][seed]:.0f}"
+    return f"{name}, seed {outcome.cell.seeds[seed]}: {outcome.ways['median'][seed]:.0f}"
 
 
 def _film(outcomes: Outcomes, outcome: Outcome, seconds: float) -> Film:
