@@ -1,0 +1,13 @@
+"""What the chapters say of other programs, where these are installed."""
+
+import inspect
+
+from stable_baselines3 import PPO
+
+
+def test_defaults_of_stable_baselines3() -> None:
+    """Chapter 5: no entropy bonus by default. Chapter 9: `target_kl` stops an update early."""
+    parameters = inspect.signature(PPO.__init__).parameters
+    assert parameters["ent_coef"].default == 0
+    assert "target_kl" in parameters
+    assert "approx_kl_div > 1.5 * self.target_kl" in inspect.getsource(PPO.train)
