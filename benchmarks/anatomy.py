@@ -89,7 +89,9 @@ def attach(clocks: Clocks, trainer: Any) -> list[tuple[Any, str, Any]]:
     """
     import torch
 
-    from inbounds.learning import optimizer, ppo, trpo, value
+    from inbounds.learning import ppo, trpo
+    from inbounds.learning.networks import adam
+    from inbounds.learning.updates import value
 
     collector, envs = trainer.collector, trainer.envs
     parts: list[tuple[Any, str, str]] = [
@@ -107,7 +109,7 @@ def attach(clocks: Clocks, trainer: Any) -> list[tuple[Any, str, Any]]:
         (trpo, "line_search", "update: line search"),
         (trpo, "fit_values", "update: forward"),
         (torch.autograd, "grad", "update: backward"),
-        (optimizer, "clip_gradients", "update: clipping"),
+        (adam, "clip_gradients", "update: clipping"),
         (trainer.optimizer, "minimize", "update: storing gradients"),
         (trainer.optimizer._adam, "step", "update: Adam"),
         (ppo, "diagnose", "update: diagnostics"),

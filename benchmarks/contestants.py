@@ -60,7 +60,8 @@ def inbounds(algo: str, seeds: int, family: str = "gaussian") -> Callable[[Work]
     """This engine."""
 
     def start(work: Work) -> Turn:
-        from inbounds.learning import Trainer, checkpoint
+        from inbounds.learning import Trainer
+        from inbounds.learning.storage import checkpoint
 
         trainer = Trainer(inbounds_config(work, algo, seeds, family))
         path = Path(tempfile.mkdtemp()) / checkpoint.FILE_NAME

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from inbounds.book import graders_lockstep
 from inbounds.learning.advantages import normalize_advantage
-from inbounds.learning.optimizer import clip_gradients
+from inbounds.learning.networks.adam import clip_gradients
 from inbounds.learning.ppo import clipped_surrogate
 
 

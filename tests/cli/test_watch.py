@@ -5,7 +5,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from inbounds.learning.run_store import load_policy
+from inbounds.learning.storage.run_store import load_policy
 from tests.cli.small import run, small, succeeds
 
 

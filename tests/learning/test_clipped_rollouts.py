@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 
 from inbounds.learning import Rollout, Trainer
-from inbounds.learning.laws import CLIPPED_NORMAL, NORMAL, NormalLaw
-from inbounds.learning.networks import flatten
+from inbounds.learning.families.family import CLIPPED_NORMAL, NORMAL, NormalLaw
+from inbounds.learning.networks.perceptron import flatten
 from tests.learning.point import PointEnv
 from tests.learning.small import small_config
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from inbounds.learning import PPOConfig, Trainer, policy_gradient, ppo
-from inbounds.learning.minibatches import Minibatch
+from inbounds.learning.updates.minibatches import Minibatch
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES, small_config, small_run, weights
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 import torch
 
-from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, checkpoint, preset, train
-from inbounds.learning.files import DamagedFileError, held
+from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, train
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.files import DamagedFileError, held
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 

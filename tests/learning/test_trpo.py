@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from inbounds.learning import Trainer, TRPOConfig, trpo
-from inbounds.learning.networks import flatten
+from inbounds.learning.networks.perceptron import flatten
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES, small_config, small_run
 

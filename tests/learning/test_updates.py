@@ -12,10 +12,10 @@ from torch.distributions import Normal, kl_divergence
 
 from inbounds.learning import Mlp, RunningNormalizer, Trainer, gae, normalize_advantage
 from inbounds.learning.config import ALGORITHMS
-from inbounds.learning.diagnostics import diagnose
-from inbounds.learning.minibatches import minibatches
-from inbounds.learning.networks import initialize_pytorch
-from inbounds.learning.optimizer import SeedAdam, clip_gradients
+from inbounds.learning.networks.adam import SeedAdam, clip_gradients
+from inbounds.learning.networks.perceptron import initialize_pytorch
+from inbounds.learning.updates.diagnostics import diagnose
+from inbounds.learning.updates.minibatches import minibatches
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES, rng, small_config, small_run
 

@@ -19,7 +19,7 @@ from tests.made_up_speed import made_up_results, ppo_turns
 def test_the_floor_counts_the_operations_of_the_networks() -> None:
     """Against PyTorch's own counter, on one gradient step of the engine."""
     from inbounds.learning import Trainer, ppo
-    from inbounds.learning.minibatches import minibatches
+    from inbounds.learning.updates.minibatches import minibatches
 
     work = Work("Hopper-v5", horizon=128)
     trainer = Trainer(inbounds_config(work, "ppo", 2, "gaussian"))

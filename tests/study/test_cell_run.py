@@ -13,8 +13,9 @@ import pytest
 import torch
 
 import inbounds.robots
-from inbounds.learning import TrainConfig, Trainer, checkpoint
-from inbounds.learning.run_store import load_policies, policies_of
+from inbounds.learning import TrainConfig, Trainer
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, cell_run, evaluate, read_cell, run_cell
 from inbounds.study.cell_run import DiskFullError

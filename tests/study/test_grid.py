@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from inbounds.learning import preset, stored_config
-from inbounds.learning.stored_config import describe
+from inbounds.learning import preset
+from inbounds.learning.storage import stored_config
+from inbounds.learning.storage.stored_config import describe
 from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, VARIANTS, Cell, all_cells, select, study_cells
 from inbounds.study.ledger import CLAIMS
 from inbounds.study.statistics import settings

@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from inbounds.cli.studying import study
-from inbounds.learning import checkpoint
+from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
 from inbounds.study.claim import Claim, read_claim
 from inbounds.study.progress import StudyProgress, cell_status, status_table
@@ -163,7 +163,7 @@ def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) ->
         from distributed import LocalCluster
         from inbounds.study import Settings, run_study
         from inbounds.study.claim import read_claim
-        from inbounds.learning import checkpoint
+        from inbounds.learning.storage import checkpoint
         from tests.study.small import folder_in
         from tests.study.test_run import cells_of
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.environment_checks import CHECKS, MakeEnvs
 from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
-from inbounds.learning.policies import SATURATION_MARGIN
+from inbounds.learning.families.policy import SATURATION_MARGIN
 
 __all__ = ["at_bounds", "diagnosis", "own_environment", "value_under_a_clock"]
 

@@ -17,8 +17,8 @@ from torch import Tensor, nn
 from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
 from inbounds.book.ppo_checks import ACT, CHECKS, GAUSSIAN, OBS, STEPS, Loss, Scene, policy_loss
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig, Rollout, ppo
-from inbounds.learning.laws import NORMAL
-from inbounds.learning.minibatches import Minibatch
+from inbounds.learning.families.family import NORMAL
+from inbounds.learning.updates.minibatches import Minibatch
 
 __all__ = ["clipped_surrogate", "diagnosis", "ppo_loss", "ppo_update"]
 

@@ -17,7 +17,7 @@ from inbounds.book.report_arms import HEADS, NONE_FINISHED, TITLES, arm_section
 from inbounds.book.report_ledger import ledger_section
 from inbounds.book.report_words import spoken
 from inbounds.book.study_figures import interval_panels
-from inbounds.learning.files import write_whole
+from inbounds.learning.storage.files import write_whole
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
 from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, STUDY_VERSION, Cell

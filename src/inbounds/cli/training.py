@@ -17,11 +17,18 @@ from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Train
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
-from inbounds.learning import TrainConfig, Trainer, checkpoint, train
-from inbounds.learning.files import DamagedFileError, held, is_disk_full
+from inbounds.learning import TrainConfig, Trainer, train
 from inbounds.learning.rollout import check_environments
-from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
-from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.files import DamagedFileError, held, is_disk_full
+from inbounds.learning.storage.run_store import (
+    CHECKPOINT_FILE,
+    CURVES_FILE,
+    POLICIES_FILE,
+    load_checkpoint,
+    save_run,
+)
+from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, differences
 from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
 from inbounds.robots.rendering import is_drawable

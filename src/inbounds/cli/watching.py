@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from inbounds.book.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Watch
-from inbounds.learning.files import is_disk_full
-from inbounds.learning.run_store import POLICIES_FILE, load_policies
-from inbounds.learning.trained_policy import TrainedPolicy
+from inbounds.learning.storage.files import is_disk_full
+from inbounds.learning.storage.run_store import POLICIES_FILE, load_policies
+from inbounds.learning.storage.trained_policy import TrainedPolicy
 from inbounds.learning.training import make_environments
 from inbounds.robots import record
 

@@ -12,12 +12,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from inbounds.learning import policy_gradient, ppo, trpo
-from inbounds.learning.actor_critic import NetworkConfig
-from inbounds.learning.checks import check
-from inbounds.learning.policies import PolicyConfig
+from inbounds.learning.families.policy import PolicyConfig
+from inbounds.learning.networks.actor_critic import NetworkConfig
 from inbounds.learning.policy_gradient import PolicyGradientConfig
 from inbounds.learning.ppo import PPOConfig
 from inbounds.learning.trpo import TRPOConfig
+from inbounds.learning.updates.checks import check
 
 AlgorithmConfig: TypeAlias = PPOConfig | TRPOConfig | PolicyGradientConfig
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from torch import Tensor
 
-from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.advantages import normalize_advantage
-from inbounds.learning.checks import check, check_minibatches
-from inbounds.learning.diagnostics import diagnose
-from inbounds.learning.optimizer import SeedAdam
+from inbounds.learning.networks.actor_critic import ActorCritic
+from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.rollout import Rollout
-from inbounds.learning.value import fit_values
+from inbounds.learning.updates.checks import check, check_minibatches
+from inbounds.learning.updates.diagnostics import diagnose
+from inbounds.learning.updates.value import fit_values
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,12 @@ import torch
 from torch import Tensor
 from torch.nn.functional import mse_loss
 
-from inbounds.learning.actor_critic import ActorCritic
-from inbounds.learning.checks import check, check_minibatches
-from inbounds.learning.diagnostics import diagnose
-from inbounds.learning.minibatches import Minibatch, minibatches
-from inbounds.learning.optimizer import SeedAdam
+from inbounds.learning.networks.actor_critic import ActorCritic
+from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.rollout import Rollout
+from inbounds.learning.updates.checks import check, check_minibatches
+from inbounds.learning.updates.diagnostics import diagnose
+from inbounds.learning.updates.minibatches import Minibatch, minibatches
 
 
 @dataclass(frozen=True)

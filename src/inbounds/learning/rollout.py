@@ -18,11 +18,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from torch import Tensor
 
-from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.advantages import gae
-from inbounds.learning.laws import Parameters
-from inbounds.learning.normalize import RunningNormalizer
-from inbounds.learning.policies import SATURATION_MARGIN
+from inbounds.learning.families.family import Parameters
+from inbounds.learning.families.policy import SATURATION_MARGIN
+from inbounds.learning.networks.actor_critic import ActorCritic
+from inbounds.learning.networks.normalizer import RunningNormalizer
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 
 ActionMode = Literal["clip", "raw"]

@@ -26,19 +26,19 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
-from inbounds.learning import checkpoint
-from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.config import ALGORITHMS, TrainConfig
-from inbounds.learning.files import held
-from inbounds.learning.policies import Policy
+from inbounds.learning.families.policy import Policy
+from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
-from inbounds.learning.stored_config import FREE_TO_CHANGE, describe, differences
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.files import held
+from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, describe, differences
 from inbounds.robots.registration import TASK_NAMES
 from inbounds.robots.registration import make as make_robots
 
 if TYPE_CHECKING:
-    from inbounds.learning.trained_policy import TrainedPolicy
+    from inbounds.learning.storage.trained_policy import TrainedPolicy
 
 Record: TypeAlias = dict[str, Any]
 """One epoch: `epoch`, `env_steps` (per seed, so far), `seconds` of wall time, and arrays `[S]` by name."""
@@ -144,7 +144,7 @@ class Trainer:
     @property
     def policies(self) -> list[TrainedPolicy]:
         """What has been learned so far, one policy per seed, ready to act without the trainer."""
-        from inbounds.learning.run_store import policies_of  # imports this module
+        from inbounds.learning.storage.run_store import policies_of  # imports this module
 
         return policies_of(self)
 

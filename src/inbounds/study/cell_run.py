@@ -17,9 +17,9 @@ from typing import Any, Literal
 import pyarrow as pa
 import safetensors
 
-from inbounds.learning import checkpoint
-from inbounds.learning.files import DamagedFileError, is_disk_full
-from inbounds.learning.run_store import load_checkpoint, save_policies
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.files import DamagedFileError, is_disk_full
+from inbounds.learning.storage.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.claim import Claim
 from inbounds.study.evaluate import GREEDY, evaluate_finally

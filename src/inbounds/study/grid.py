@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
 
 from inbounds.learning import TrainConfig, preset
-from inbounds.learning.stored_config import describe
+from inbounds.learning.storage.stored_config import describe
 
 STUDY_VERSION = 1
 """Raised by whatever changes results: another protocol, another engine. Results of two versions are never mixed."""

@@ -1,7 +1,7 @@
 """What the study leaves: a Parquet file per cell, policies, checksums.
 
     results/cells/ID.parquet          one row per epoch and seed; `COLUMNS` is the schema
-    results/policies/ID.safetensors   the final policies of all seeds (`inbounds.learning.run_store.load_policies`)
+    results/policies/ID.safetensors   the final policies of all seeds (`inbounds.learning.load_policies`)
     results/policies/ID.parquet       their returns: one row per seed, way to act and episode
     results/checksums.txt             SHA-256 of each file, as `sha256sum --check` reads it
 
@@ -23,9 +23,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
-from inbounds.learning.files import DamagedFileError, write_whole
-from inbounds.learning.run_files import METADATA_KEY, metadata_of
-from inbounds.learning.stored_config import differences
+from inbounds.learning.storage.files import DamagedFileError, write_whole
+from inbounds.learning.storage.run_files import METADATA_KEY, metadata_of
+from inbounds.learning.storage.stored_config import differences
 from inbounds.study.claim import file_lock
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 

@@ -17,8 +17,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from inbounds.learning.files import DamagedFileError
-from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
+from inbounds.learning.storage.files import DamagedFileError
+from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, differences
 from inbounds.study import store
 from inbounds.study.grid import Cell
 from inbounds.study.measure import MeasuredTrainer

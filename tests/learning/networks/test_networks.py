@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inbounds.learning import ActorCritic, Mlp, NetworkConfig, Policy, PolicyConfig
-from inbounds.learning.networks import initialize_orthogonal, initialize_pytorch, tanh
+from inbounds.learning.networks.perceptron import initialize_orthogonal, initialize_pytorch, tanh
 
 SIZES = (5, 16, 16, 4)
 

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
-from inbounds.learning.actor_critic import NetworkConfig
 from inbounds.learning.config import ALGORITHMS, TrainConfig
-from inbounds.learning.laws import Limits
-from inbounds.learning.policies import PolicyConfig
-from inbounds.learning.stored_config import describe
+from inbounds.learning.families.family import Limits
+from inbounds.learning.families.policy import PolicyConfig
+from inbounds.learning.networks.actor_critic import NetworkConfig
+from inbounds.learning.storage.stored_config import describe
 
 METADATA_KEY = "inbounds"
 FORMAT = 1

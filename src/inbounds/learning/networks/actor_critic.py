@@ -9,10 +9,16 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
-from inbounds.learning.initial_noise import head_bias
-from inbounds.learning.laws import Parameters
-from inbounds.learning.networks import Mlp, SeedLinear, initialize_orthogonal, initialize_pytorch, mlp
-from inbounds.learning.policies import Policy
+from inbounds.learning.families.family import Parameters
+from inbounds.learning.families.initial_noise import head_bias
+from inbounds.learning.families.policy import Policy
+from inbounds.learning.networks.perceptron import (
+    Mlp,
+    SeedLinear,
+    initialize_orthogonal,
+    initialize_pytorch,
+    mlp,
+)
 
 DTYPES = {"float32": torch.float32, "float64": torch.float64}
 
@@ -57,7 +63,7 @@ class ActorCritic:
 
     Example:
         >>> import numpy as np
-        >>> from inbounds.learning.policies import PolicyConfig
+        >>> from inbounds.learning.families.policy import PolicyConfig
         >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(2), high=np.ones(2))
         >>> nets = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in range(5)])
         >>> nets.outputs(torch.zeros(5, 7, 3)).shape, nets.values(torch.zeros(5, 7, 3)).shape

@@ -33,8 +33,8 @@ from torch.distributions import Distribution, Normal
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta, trapezoid
 from inbounds.distributions.scaled_beta import log_beta
-from inbounds.learning import laws
-from inbounds.learning.laws import BETA, CLIPPED_NORMAL, NORMAL, Array, Law, Limits, Parameters
+from inbounds.learning.families import family as laws
+from inbounds.learning.families.family import BETA, CLIPPED_NORMAL, NORMAL, Array, Law, Limits, Parameters
 
 SATURATION_MARGIN = 1e-3
 """Of half the action range: an executed action closer than this to a bound counts as at the bound."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from inbounds.learning.actor_critic import ActorCritic
+from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.rollout import Rollout
 
 

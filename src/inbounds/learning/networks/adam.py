@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from inbounds.learning.networks import Mlp
+from inbounds.learning.networks.perceptron import Mlp
 
 
 class SeedAdam:

@@ -1,7 +1,7 @@
 r"""What a policy draws: the law of the latent, one row of a batch for every state.
 
 PPO, TRPO and REINFORCE see nothing of a policy but its law: ratio, score, KL divergence and Fisher information
-live here, in latent space. What becomes of the latent is the map's business (`inbounds.learning.policies`).
+live here, in latent space. What becomes of the latent is the map's business (`inbounds.learning.families.policy`).
 A law has two parameters per action dimension, which the network's last layer feeds:
 
 | Law              | Parameters                          | Latent                                     |

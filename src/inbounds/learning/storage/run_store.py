@@ -21,11 +21,11 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from inbounds.learning import checkpoint
 from inbounds.learning.config import TrainConfig
-from inbounds.learning.files import damaged, find, write_whole
-from inbounds.learning.run_files import METADATA_KEY, config_from, metadata_of
-from inbounds.learning.trained_policy import TrainedPolicy
+from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.files import damaged, find, write_whole
+from inbounds.learning.storage.run_files import METADATA_KEY, config_from, metadata_of
+from inbounds.learning.storage.trained_policy import TrainedPolicy
 from inbounds.learning.training import Record, Trainer
 
 CHECKPOINT_FILE = checkpoint.FILE_NAME

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from torch import Tensor
 
-from inbounds.learning.actor_critic import ActorCritic
-from inbounds.learning.minibatches import minibatches
-from inbounds.learning.optimizer import SeedAdam
+from inbounds.learning.networks.actor_critic import ActorCritic
+from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.rollout import Rollout
+from inbounds.learning.updates.minibatches import minibatches
 
 
 def fit_values(

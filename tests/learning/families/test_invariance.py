@@ -5,7 +5,7 @@ import torch
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Parameters, Trainer
-from inbounds.learning.laws import NormalLaw
+from inbounds.learning.families.family import NormalLaw
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, small_config, small_run, weights
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from torch.distributions import Distribution
 
 from inbounds.learning.config import TrainConfig
-from inbounds.learning.networks import Mlp
-from inbounds.learning.normalize import RunningNormalizer
-from inbounds.learning.policies import Policy
+from inbounds.learning.families.policy import Policy
+from inbounds.learning.networks.normalizer import RunningNormalizer
+from inbounds.learning.networks.perceptron import Mlp
 
 
 class TrainedPolicy:
@@ -55,7 +55,7 @@ class TrainedPolicy:
     def from_tensors(
         cls, config: TrainConfig, tensors: Mapping[str, NDArray[Any]], index: int
     ) -> TrainedPolicy:
-        """Take one seed out of the tensors of a run (`inbounds.learning.run_store.save_policies` names them).
+        """Take one seed out of the tensors of a run (`inbounds.learning.storage.run_store.save_policies` names them).
 
         Args:
             config: of the run.

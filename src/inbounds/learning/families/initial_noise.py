@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from inbounds.distributions import trapezoid
-from inbounds.learning.policies import PolicyConfig
+from inbounds.learning.families.policy import PolicyConfig
 
 
 def executed_std(family: str, scale: float) -> float:

@@ -9,7 +9,7 @@ from scipy import stats
 from torch.distributions import Beta, Normal, kl_divergence
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
-from inbounds.learning.laws import BETA, CLIPPED_NORMAL, NORMAL, Limits, Parameters
+from inbounds.learning.families.family import BETA, CLIPPED_NORMAL, NORMAL, Limits, Parameters
 
 LAWS = {"normal": NORMAL, "clipped": CLIPPED_NORMAL, "beta": BETA}
 real = st.floats(-3, 3)

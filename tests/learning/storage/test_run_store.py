@@ -12,9 +12,9 @@ from scipy import stats
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Trainer, preset
-from inbounds.learning.files import DamagedFileError, write_whole
-from inbounds.learning.run_files import config_from, metadata_of
-from inbounds.learning.run_store import (
+from inbounds.learning.storage.files import DamagedFileError, write_whole
+from inbounds.learning.storage.run_files import config_from, metadata_of
+from inbounds.learning.storage.run_store import (
     COLUMNS,
     config_of,
     load_checkpoint,

@@ -7,7 +7,7 @@ from scipy import stats
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.learning import FAMILIES, Parameters, Policy, PolicyConfig, executed_std
-from inbounds.learning.initial_noise import head_bias
+from inbounds.learning.families.initial_noise import head_bias
 from tests.learning.small import FAMILIES as NAMES
 
 LOW, HIGH = np.array([-2.0, 0.5]), np.array([1.0, 4.5])

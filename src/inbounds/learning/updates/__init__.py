@@ -1,0 +1,1 @@
+"""What REINFORCE, PPO and TRPO share: minibatches, the regression of the values, diagnostics, checks of numbers."""
