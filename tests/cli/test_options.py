@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from inbounds.cli import options
 from inbounds.learning import FAMILIES, NetworkConfig, PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
-from inbounds.learning.families.family import Limits
+from inbounds.learning.families import Limits
 from tests.cli.small import run, succeeds
 
 PRESETS = get_args(options.PresetName)

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from inbounds.learning import Rollout, Trainer
-from inbounds.learning.families.family import CLIPPED_NORMAL, NORMAL, NormalLaw
+from inbounds.learning.families import CLIPPED_NORMAL, NORMAL, NormalLaw
 from inbounds.learning.networks.perceptron import flatten
 from tests.learning.point import PointEnv
 from tests.learning.small import small_config
@@ -39,7 +39,7 @@ def gradient(trainer: Trainer, rollout: Rollout, law: NormalLaw, latent: Tensor,
 
 def redraw(rollout: Rollout, generator: torch.Generator) -> Tensor:
     """Return latents `[S, T, A]` that clip to the same actions, by inversion of the tails."""
-    loc, scale = rollout.parameters.first, rollout.parameters.second.exp()
+    loc, scale = rollout.parameters.loc, rollout.parameters.log_scale.exp()
     uniform = torch.rand(rollout.latent.shape, generator=generator, dtype=torch.float64)
     above = loc - scale * torch.special.ndtri(uniform * torch.special.ndtr((loc - 1) / scale))
     below = loc + scale * torch.special.ndtri(uniform * torch.special.ndtr((-1 - loc) / scale))

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from inbounds.distributions import expectation, trapezoid
-from inbounds.learning import FAMILIES, Parameters, PolicyGradientConfig, Trainer, policy_gradient
+from inbounds.learning import FAMILIES, PolicyGradientConfig, Trainer, policy_gradient
+from inbounds.learning.families import NormalParameters
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES as NAMES
 from tests.learning.small import small_config, small_run
@@ -30,7 +31,7 @@ def true_gradient(family: str) -> torch.Tensor:
 def one_step_gradients(family: str, executed_density: bool = False) -> torch.Tensor:
     """[N, 2] single-sample policy gradients; the density at the executed action is a classic mistake."""
     law = FAMILIES["gaussian" if executed_density else family].law
-    p = Parameters(
+    p = NormalParameters(
         *(torch.full((N, 1), x, dtype=torch.float64, requires_grad=True) for x in (LOC, LOG_SCALE))
     )
     z = LOC + torch.tensor(LOG_SCALE).double().exp() * torch.randn(N, 1, dtype=torch.float64)

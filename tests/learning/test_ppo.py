@@ -44,7 +44,7 @@ def test_the_loss_is_what_the_docstring_says() -> None:
     by_hand = 0.0
     for s in range(3):
         parameters = nets.parameters(batch.obs)
-        law = torch.distributions.Beta(parameters.first[s], parameters.second[s])
+        law = torch.distributions.Beta(parameters.concentration1[s], parameters.concentration0[s])
         ratio = (law.log_prob(batch.latent[s]).sum(-1) - batch.log_prob[s]).exp()
         surrogate = torch.min(ratio * batch.advantage[s], ratio.clip(0.95, 1.05) * batch.advantage[s]).mean()
         entropy = (law.entropy() + torch.log(torch.tensor(2.0))).sum(-1).mean()

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inbounds.learning import FAMILIES as LAWS
-from inbounds.learning import Parameters, ppo
+from inbounds.learning import ppo
+from inbounds.learning.families import NormalParameters
 from tests.learning.small import small_config, small_run, weights
 
 
@@ -58,7 +59,7 @@ def test_at_its_maximum_the_surrogate_bounds_neither_ratio_nor_divergence(clip_r
         assert log_ratio[best, 0].item() == pytest.approx(k**2 / 2 * math.log(1 + clip_range), rel=1e-4)
         assert log_ratio[best, 1].exp() < 1 + clip_range  # never clipped
         old, new = (
-            Parameters(mean[None, :, None], torch.zeros(1, 2, 1, dtype=torch.float64))
+            NormalParameters(mean[None, :, None], torch.zeros(1, 2, 1, dtype=torch.float64))
             for mean in (0 * features, w[best] * features)
         )
         divergence = LAWS["gaussian"].law.kl(old, new).mean().item()
@@ -75,7 +76,7 @@ def test_only_the_gaussians_bonus_has_no_end(family: str, most: float) -> None:
     )
     if family == "beta":
         first, second = 1 + first.exp(), 1 + second.exp()
-    entropy = LAWS[family].entropy(Parameters(first.double(), second.double()))
+    entropy = LAWS[family].entropy(LAWS[family].law.named(first.double(), second.double()))
     if math.isfinite(most):
         assert (entropy < math.log(most) + 1e-3).all()  # the logit-normal's is quick, and right to 1e-3
     else:

@@ -78,7 +78,8 @@ def test_actions_come_from_latents_and_log_probs_belong_to_them(family: str) -> 
     assert np.array_equal(rollout.action, box)
     parameters = acting.networks.parameters(rollout.obs)
     assert torch.equal(rollout.log_prob, policy.law.log_prob(parameters, rollout.latent))
-    assert torch.equal(rollout.parameters.first, parameters.first)
+    for stored, found in zip(rollout.parameters, parameters, strict=True):
+        assert torch.equal(stored, found)
     unit = (box - policy.centre) / policy.half_range
     assert np.allclose(rollout.saturation, (np.abs(unit) > 0.999).mean((1, 2)))
     assert (rollout.saturation > 0.1).all() == (family in ("gaussian", "clipped-gaussian"))

@@ -64,7 +64,8 @@ def test_in_expectation_the_sampled_fisher_is_the_hessian(family: str) -> None:
     if family == "beta":
         latent = torch.distributions.Beta(*parameters).sample()
     else:
-        latent = parameters.first + parameters.second.exp() * torch.randn_like(parameters.first)
+        loc, log_scale = parameters
+        latent = loc + log_scale.exp() * torch.randn_like(loc)
     v = torch.randn(nets.actor.theta.shape, dtype=torch.float64)
     log_prob = nets.policy.law.log_prob(nets.parameters(obs), latent)
     w = torch.ones_like(log_prob, requires_grad=True)

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from inbounds import learning
 from inbounds.study import Cell, StudyFolder
 from inbounds.study.cell_run import RETURNS
 from inbounds.study.grid import FAMILIES
-from inbounds.study.measure import MEASURE_EVERY, describe_parameters
+from inbounds.study.measure import MEASURE_EVERY
 from inbounds.study.provenance import provenance
 from inbounds.study.store import cell_metadata, parquet_bytes, table_of
 
@@ -69,11 +70,11 @@ def _contents(folder: StudyFolder, cell: Cell, diverged: tuple[int, ...], noise:
 
 
 def _measured(cell: Cell, epoch: int, greedy: Any, rng: np.random.Generator) -> dict[str, Any]:
-    first = 1 + rng.random((len(cell.seeds), 20, 3))
+    numbers, law = 1 + rng.random((len(cell.seeds), 20, 3)), learning.FAMILIES[cell.family].law
     names = ["entropy", "kl", "approx_kl", "explained_variance", "action_std", "saturation"]
     names += ["clip_fraction"] if cell.algorithm == "ppo" else ["accepted", "step_fraction"]
     return (
         {"epoch": epoch, "greedy_return": greedy, "evaluation_seconds": 0.5}
         | {name: rng.random(len(cell.seeds)) for name in names}
-        | describe_parameters(cell.family, first, first, cell.config.policy.limits)
+        | law.describe(law.named(numbers, numbers), cell.config.policy.limits)
     )

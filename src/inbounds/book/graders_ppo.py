@@ -17,7 +17,6 @@ from torch import Tensor, nn
 from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
 from inbounds.book.ppo_checks import ACT, CHECKS, GAUSSIAN, OBS, STEPS, Loss, Scene, policy_loss
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig, Rollout, ppo
-from inbounds.learning.families.family import NORMAL
 from inbounds.learning.updates.minibatches import Minibatch
 
 __all__ = ["clipped_surrogate", "diagnosis", "ppo_loss", "ppo_update"]
@@ -203,8 +202,9 @@ def _data(networks: ActorCritic) -> Minibatch:
     advantage, return_ = torch.randn(2, STEPS, generator=generator, dtype=torch.float64)
     with torch.no_grad():
         parameters = networks.parameters(obs)
-        latent = parameters.first + parameters.second.exp() * noise
-        log_prob = NORMAL.log_prob(parameters, latent)
+        loc, log_scale = parameters
+        latent = loc + log_scale.exp() * noise
+        log_prob = networks.policy.law.log_prob(parameters, latent)
     return Minibatch(obs[0], latent[0], log_prob[0], 2 * advantage + 1, 3 * return_)
 
 

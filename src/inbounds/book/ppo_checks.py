@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeAlias
 import torch
 from torch import Tensor, nn
 
-from inbounds.learning.families.family import NORMAL, Limits
-from inbounds.learning.families.policy import normal_entropy
+from inbounds.learning.families import NORMAL, Limits
+from inbounds.learning.families.gaussian import normal_entropy
 
 __all__ = ["CHECKS", "GAUSSIAN", "Law", "Loss", "Scene", "policy_loss"]
 

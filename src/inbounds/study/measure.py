@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+from torch import Tensor
 
-from inbounds.learning import DivergedSeedWarning, Limits, Rollout, Trainer
+from inbounds.learning import DivergedSeedWarning, Rollout, Trainer
 from inbounds.study import store
 from inbounds.study.evaluate import GreedyEvaluation
 from inbounds.study.grid import Cell
@@ -104,9 +105,8 @@ class MeasuredTrainer:
         self.progress.seconds["evaluation"] += seconds
         measured = {"epoch": record["epoch"], "greedy_return": greedy_return, "evaluation_seconds": seconds}
         measured |= {name: value for name, value in record.items() if name in store.MEASURED}
-        limits = self.config.policy.limits
-        first, second = (p.numpy() for p in rollout.parameters)  # [S, T, A]
-        measured |= describe_parameters(self.config.policy.family, first, second, limits)
+        parameters = rollout.parameters.each(Tensor.numpy)  # [S, T, A]
+        measured |= self.trainer.networks.policy.law.describe(parameters, self.config.policy.limits)
         self.progress.measurements.append(measured)
 
     def state_dict(self) -> dict[str, Any]:
@@ -123,43 +123,3 @@ class MeasuredTrainer:
         """Close the environments."""
         self.evaluation.players.close()
         self.trainer.envs.close()
-
-
-def describe_parameters(
-    family: str, first: NDArray[Any], second: NDArray[Any], limits: Limits
-) -> dict[str, NDArray[Any]]:
-    """Return quantiles of a law's parameters, and how many are at their clamps.
-
-    Args:
-        family: name of the policy family.
-        first: `[S, T, A]` μ, or α for `beta`.
-        second: `[S, T, A]` log σ, or β.
-        limits: the clamps.
-
-    Returns:
-        `[S]` by the names of `inbounds.study.store.MEASURED`.
-
-    Example:
-        >>> found = describe_parameters("gaussian", np.full((1, 4, 2), -3.0), np.ones((1, 4, 2)), Limits())
-        >>> [found[name].round(2).tolist() for name in ("abs_loc_q50", "scale_q99", "at_log_std_max")]
-        [[3.0], [2.72], [1.0]]
-    """
-    if family == "beta":
-        cap = limits.concentration_max
-        return {
-            **_quantiles("alpha", first, (1, 50, 99)),
-            **_quantiles("beta", second, (1, 50, 99)),
-            "at_alpha_max": (first >= cap).mean((1, 2)),
-            "at_beta_max": (second >= cap).mean((1, 2)),
-        }
-    return {
-        **_quantiles("abs_loc", np.abs(first), (50, 90, 99)),
-        **_quantiles("scale", np.exp(second), (1, 50, 99)),
-        "at_log_std_min": (second <= limits.log_std_min).mean((1, 2)),
-        "at_log_std_max": (second >= limits.log_std_max).mean((1, 2)),
-    }
-
-
-def _quantiles(name: str, values: NDArray[Any], percents: tuple[int, ...]) -> dict[str, NDArray[Any]]:
-    found = np.quantile(values, np.array(percents) / 100, axis=(1, 2))  # [Q, S]
-    return {f"{name}_q{percent:02}": found[i] for i, percent in enumerate(percents)}

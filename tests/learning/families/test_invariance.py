@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from inbounds.distributions import LogitNormal
-from inbounds.learning import Parameters, Trainer
-from inbounds.learning.families.family import NormalLaw
+from inbounds.learning import Trainer
+from inbounds.learning.families import NormalLaw, NormalParameters
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, small_config, small_run, weights
 
@@ -33,8 +33,8 @@ def test_what_is_not_invariant_is_the_entropy() -> None:
 class ActionSpaceLaw(NormalLaw):
     """Scores the action, by the public density; latents only carry it there."""
 
-    def log_prob(self, parameters: Parameters, latent: torch.Tensor) -> torch.Tensor:
-        law = LogitNormal(parameters.first, parameters.second.exp(), -1.0, 1.0, validate_args=False)
+    def log_prob(self, parameters: NormalParameters, latent: torch.Tensor) -> torch.Tensor:
+        law = LogitNormal(parameters.loc, parameters.log_scale.exp(), -1.0, 1.0, validate_args=False)
         return law.log_prob(torch.tanh(latent / 2)).sum(-1)
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 from torch.distributions import Beta, Normal, kl_divergence
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
-from inbounds.learning.families.family import BETA, CLIPPED_NORMAL, NORMAL, Limits, Parameters
+from inbounds.learning.families import BETA, CLIPPED_NORMAL, NORMAL, BetaParameters, Limits, Parameters
 
 LAWS = {"normal": NORMAL, "clipped": CLIPPED_NORMAL, "beta": BETA}
 real = st.floats(-3, 3)
@@ -31,9 +31,9 @@ def latents(law: str, n: int = 3) -> torch.Tensor:
 @given(real, real)
 def test_normal_log_prob_and_kl_are_torchs(a: float, b: float) -> None:
     p, q = parameters_of("normal", a, b), parameters_of("normal", b, a)
-    ours, theirs = NORMAL.log_prob(p, latents("normal")), Normal(p.first, p.second.exp())
+    ours, theirs = NORMAL.log_prob(p, latents("normal")), Normal(p.loc, p.log_scale.exp())
     assert torch.allclose(ours, theirs.log_prob(latents("normal")).sum(-1), rtol=1e-12)
-    kl = kl_divergence(theirs, Normal(q.first, q.second.exp())).sum(-1)
+    kl = kl_divergence(theirs, Normal(q.loc, q.log_scale.exp())).sum(-1)
     assert torch.allclose(NORMAL.kl(p, q), kl, rtol=1e-9, atol=1e-12)
 
 
@@ -50,7 +50,7 @@ def test_beta_log_prob_and_kl_are_torchs(a: float, b: float) -> None:
 def test_clipped_law_scores_the_executed_action() -> None:
     p = parameters_of("clipped", 0.4, -0.2, n=4)
     z = torch.tensor([-7.0, -0.5, 0.9, 1.3], dtype=torch.float64)
-    law = ClippedNormal(p.first, p.second.exp(), -1.0, 1.0)
+    law = ClippedNormal(p.loc, p.log_scale.exp(), -1.0, 1.0)
     assert torch.allclose(CLIPPED_NORMAL.log_prob(p, z), law.log_prob(z.clamp(-1, 1)).sum(-1))
     assert CLIPPED_NORMAL.kl(p, parameters_of("clipped", 0.0, 0.0, n=4)) < NORMAL.kl(
         p, parameters_of("normal", 0.0, 0.0, n=4)
@@ -63,9 +63,9 @@ def test_kl_is_the_expected_log_ratio(law: str) -> None:
     rng = np.random.default_rng(0)
     draw = LAWS[law].sampler([rng], 200_000, 1, np.float64)
     if law == "beta":
-        z = rng.beta(p.first.item(), p.second.item(), (200_000, 1))
+        z = rng.beta(p.concentration1.item(), p.concentration0.item(), (200_000, 1))
     else:
-        z = np.stack([draw(Parameters(*(x.numpy()[None] for x in p)), t)[0] for t in range(200_000)])
+        z = np.stack([draw(p.each(lambda x: x.numpy()[None]), t)[0] for t in range(200_000)])
     z = torch.from_numpy(z)
     log_ratio = LAWS[law].log_prob(p, z) - LAWS[law].log_prob(q, z)
     error = log_ratio.std() / math.sqrt(len(log_ratio))
@@ -75,16 +75,16 @@ def test_kl_is_the_expected_log_ratio(law: str) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_each_seed_draws_its_law_from_its_own_generator(law: str) -> None:
     p = parameters_of(law, 0.5, -0.5, n=2)
-    both = Parameters(*(np.tile(x.numpy(), (2, 1)) for x in p))
+    both = p.each(lambda x: np.tile(x.numpy(), (2, 1)))
 
     def draws(seeds: tuple[int, int], dtype: type) -> np.ndarray:
         draw = LAWS[law].sampler([np.random.default_rng(s) for s in seeds], 2000, 2, dtype)
-        cast = Parameters(*(x.astype(dtype) for x in both))
+        cast = both.each(lambda x: x.astype(dtype))
         return np.stack([draw(cast, t) for t in range(2000)], 1)  # [S, T, A]
 
     sample = draws((1, 2), np.float64)
     for a in range(2):
-        first, second = p.first[a].item(), p.second[a].item()
+        first, second = (x[a].item() for x in p)
         law_a = stats.beta(first, second) if law == "beta" else stats.norm(first, math.exp(second))
         assert stats.kstest(sample[0, :, a], law_a.cdf).pvalue > 1e-3
     other = draws((1, 3), np.float64)
@@ -94,12 +94,12 @@ def test_each_seed_draws_its_law_from_its_own_generator(law: str) -> None:
 
 
 def test_beta_latents_stay_inside_and_a_nan_seed_harms_no_other() -> None:
-    extreme = Parameters(np.array([[80.0], [np.nan], [80.0]]), np.array([[1.0], [1.0], [1.0]]))
+    extreme = BetaParameters(np.array([[80.0], [np.nan], [80.0]]), np.array([[1.0], [1.0], [1.0]]))
     draw = BETA.sampler([np.random.default_rng(s) for s in range(3)], 2000, 1, np.float32)
     sample = np.stack([draw(extreme, t) for t in range(2000)], 1)
     assert np.isnan(sample[1]).all()
     assert ((sample[[0, 2]] > 0) & (sample[[0, 2]] < 1)).all()
-    rest = Parameters(extreme.first[[0, 2]], extreme.second[[0, 2]])
+    rest = extreme.each(lambda x: x[[0, 2]])
     draw = BETA.sampler([np.random.default_rng(s) for s in (0, 2)], 2000, 1, np.float32)
     assert np.array_equal(sample[[0, 2]], np.stack([draw(rest, t) for t in range(2000)], 1))
 
@@ -115,10 +115,10 @@ def test_parameters_agree_between_numpy_and_torch_and_respect_the_limits(law: st
     for a, b in zip(ours, acting, strict=True):
         assert np.allclose(a.numpy(), b, rtol=1e-14)
     if law == "beta":
-        assert torch.equal(ours.first[0, [0, 2]], torch.tensor([1.0, 20.0]).double())
-        assert abs(ours.second[0, 1] - 1 - math.log1p(math.exp(0.3))) < 1e-12
+        assert torch.equal(ours.concentration1[0, [0, 2]], torch.tensor([1.0, 20.0]).double())
+        assert abs(ours.concentration0[0, 1] - 1 - math.log1p(math.exp(0.3))) < 1e-12
     else:
-        assert ours.second[0].tolist() == [-3.0, pytest.approx(0.3), 0.5]
+        assert ours.log_scale[0].tolist() == [-3.0, pytest.approx(0.3), 0.5]
 
 
 def test_the_hard_clip_of_log_std_has_no_gradient_outside() -> None:
@@ -133,7 +133,7 @@ def test_latent_ratios_are_action_ratios() -> None:
     """What lets an algorithm see the law only: the map's Jacobian cancels."""
     p, q = parameters_of("normal", 0.3, -0.4), parameters_of("normal", -0.2, 0.1)
     z = latents("normal")
-    p_action, q_action = (LogitNormal(x.first, x.second.exp(), -1.0, 1.0) for x in (p, q))
+    p_action, q_action = (LogitNormal(x.loc, x.log_scale.exp(), -1.0, 1.0) for x in (p, q))
     action = torch.tanh(z / 2)
     expected = (p_action.log_prob(action) - q_action.log_prob(action)).sum()
     assert torch.allclose(NORMAL.log_prob(p, z) - NORMAL.log_prob(q, z), expected, rtol=1e-10)

@@ -7,7 +7,7 @@ from scipy import stats
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.learning import FAMILIES, Parameters, Policy, PolicyConfig, executed_std
-from inbounds.learning.families.initial_noise import head_bias
+from inbounds.learning.families import BetaParameters, NormalParameters, head_bias
 from tests.learning.small import FAMILIES as NAMES
 
 LOW, HIGH = np.array([-2.0, 0.5]), np.array([1.0, 4.5])
@@ -20,14 +20,14 @@ def policy(family: str) -> Policy:
 def parameters(family: str, spread: float = -0.3) -> Parameters:
     first = torch.tensor([[0.4, -1.2], [0.0, 0.7]], dtype=torch.float64)
     if family == "beta":
-        return Parameters(2 + first.abs(), 1.5 + first.square())
-    return Parameters(first, torch.full_like(first, spread))
+        return BetaParameters(2 + first.abs(), 1.5 + first.square())
+    return NormalParameters(first, torch.full_like(first, spread))
 
 
 def action_law(family: str, p: Parameters) -> LogitNormal | ScaledBeta | ClippedNormal:
     kind = {"logit-normal": LogitNormal, "beta": ScaledBeta}.get(family, ClippedNormal)
-    second = p.second if family == "beta" else p.second.exp()
-    return kind(p.first, second, -1.0, 1.0)
+    first, second = p
+    return kind(first, second if family == "beta" else second.exp(), -1.0, 1.0)
 
 
 def test_gaussian_and_logit_normal_share_one_law() -> None:
@@ -48,7 +48,7 @@ def test_the_map_takes_the_latents_range_to_the_box(family: str) -> None:
 def test_the_maps_are_those_of_the_public_distributions() -> None:
     latent = torch.linspace(-4, 4, 9, dtype=torch.float64)
     for family in ("logit-normal", "clipped-gaussian"):
-        law = action_law(family, Parameters(torch.zeros(9).double(), torch.zeros(9).double()))
+        law = action_law(family, NormalParameters(torch.zeros(9).double(), torch.zeros(9).double()))
         unit = FAMILIES[family].to_unit(latent, torch)
         assert torch.allclose(unit, law.latent_to_value(latent), atol=1e-12)
 
@@ -109,19 +109,19 @@ def test_an_unknown_greedy_action_is_refused_with_the_choices() -> None:
 def test_entropy_and_its_gradient_are_those_of_the_named_law(family: str, spread: float) -> None:
     p = parameters(family, spread)
     leaves = [x.clone().requires_grad_() for x in p]
-    ours = FAMILIES[family].entropy(Parameters(*leaves))
+    ours = FAMILIES[family].entropy(type(p)(*leaves))
     assert ours.shape == (2,)
     same = [x.clone().requires_grad_() for x in p]
     if family == "gaussian":
         theirs = torch.distributions.Normal(same[0], same[1].exp()).entropy().sum(-1)
     else:
-        theirs = action_law(family, Parameters(*same)).entropy().sum(-1)
+        theirs = action_law(family, type(p)(*same)).entropy().sum(-1)
     tolerance = 1e-3 if family == "logit-normal" else 1e-9
     assert torch.allclose(ours, theirs, atol=tolerance, rtol=0)
     ours_gradients = torch.autograd.grad(ours.sum(), leaves, allow_unused=True)
     their_gradients = torch.autograd.grad(theirs.sum(), same, allow_unused=True)
     for a, b in zip(ours_gradients, their_gradients, strict=True):
-        zero = torch.zeros_like(p.first)
+        zero = torch.zeros_like(leaves[0])
         assert torch.allclose(zero if a is None else a, zero if b is None else b, atol=2 * tolerance, rtol=0)
 
 
@@ -155,6 +155,7 @@ def test_executed_std_is_that_of_the_public_distributions() -> None:
     ("config", "message"),
     [
         (lambda: PolicyConfig("normal"), "no policy family 'normal'; choose one of gaussian"),
+        (lambda: executed_std("cauchy", 1.0), "no policy family 'cauchy'; choose one of gaussian"),
         (lambda: PolicyConfig("beta", state_dependent_std=False), "no scale"),
         (lambda: head_bias(PolicyConfig("beta", initial_std=0.7)), "between 0.07"),
         (lambda: head_bias(PolicyConfig("gaussian", initial_std=1.2)), "out of reach"),

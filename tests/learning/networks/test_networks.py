@@ -126,20 +126,20 @@ def test_each_head_has_its_own_gain() -> None:
 def test_initial_std_sets_the_heads_bias() -> None:
     nets = actor_critic(PolicyConfig("logit-normal", initial_std=0.4166))
     parameters = nets.parameters(torch.zeros(3, 1, 5).double())
-    assert torch.allclose(parameters.second, torch.zeros(()).double(), atol=2e-3)
-    assert not parameters.first.any()
+    assert torch.allclose(parameters.log_scale, torch.zeros(()).double(), atol=2e-3)
+    assert not parameters.loc.any()
 
 
 def test_state_independent_std_is_one_number_that_learns() -> None:
     nets = actor_critic(PolicyConfig("gaussian", state_dependent_std=False))
     nets.actor.theta.add_(0.1 * torch.randn_like(nets.actor.theta))  # even if something moved the hidden rows
-    log_std = nets.parameters(torch.randn(3, 6, 5).double()).second
+    log_std = nets.parameters(torch.randn(3, 6, 5).double()).log_scale
     assert torch.equal(log_std, log_std[:, :1].expand_as(log_std))
     gradients = torch.autograd.grad(log_std.sum(), nets.actor.parameters)
     assert gradients[-1][:, 2:].eq(6).all()  # the bias, once per state
     assert not any(gradient.any() for gradient in gradients[:-1])
     fresh = actor_critic(PolicyConfig("gaussian", state_dependent_std=False))
-    assert not fresh.parameters(torch.randn(3, 6, 5).double()).second.any()  # σ = 1
+    assert not fresh.parameters(torch.randn(3, 6, 5).double()).log_scale.any()  # σ = 1
     assert np.array_equal(fresh.actor.act(np.ones((3, 5)))[:, 2:], np.zeros((3, 2)))
 
 

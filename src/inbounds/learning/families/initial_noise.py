@@ -13,13 +13,7 @@ every state; under PyTorch's default initialisation it is right on average only.
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-from scipy.optimize import brentq
-
-from inbounds.distributions import trapezoid
-from inbounds.learning.families.policy import PolicyConfig
+from inbounds.learning.families.policy import PolicyConfig, family_of
 
 
 def executed_std(family: str, scale: float) -> float:
@@ -32,19 +26,14 @@ def executed_std(family: str, scale: float) -> float:
     Returns:
         The standard deviation, in units of half the action range; below 1, where all mass is on the bounds.
 
+    Raises:
+        ValueError: no family of that name.
+
     Example:
         >>> [round(executed_std(f, 1.0), 4) for f in ("gaussian", "logit-normal", "beta")]
         [0.7184, 0.4166, 0.5774]
     """
-    if family == "beta":
-        return 1 / math.sqrt(2 * scale + 1)
-    if family == "logit-normal":
-        nodes, weights = (x.numpy() for x in trapezoid())
-        return math.sqrt(np.sum(weights * np.tanh(scale * nodes / 2) ** 2))
-    bound = 1 / scale  # E[u²] = σ² E[ε²; |ε| < 1/σ] + P(|ε| > 1/σ)
-    outside = math.erfc(bound / math.sqrt(2))
-    density = math.exp(-(bound**2) / 2) / math.sqrt(2 * math.pi)
-    return math.sqrt(scale**2 * (1 - outside - 2 * bound * density) + outside)
+    return family_of(family).executed_std(scale)
 
 
 def head_bias(config: PolicyConfig) -> tuple[float, float] | None:
@@ -64,29 +53,13 @@ def head_bias(config: PolicyConfig) -> tuple[float, float] | None:
         >>> loc, round(log_scale, 3)
         (0.0, 0.0)
     """
-    std = config.initial_std
+    std, family = config.initial_std, family_of(config.family)
     if std is None:
         return None
-    limits = config.limits
-    if config.family == "beta":
-        smallest, largest = (executed_std("beta", a) for a in (limits.concentration_max, 1.0))
-    else:
-        smallest, largest = (
-            executed_std(config.family, math.exp(s)) for s in (limits.log_std_min, limits.log_std_max)
-        )
+    smallest, largest = map(family.executed_std, family.scales(config.limits))
     if not smallest < std < largest:
         raise ValueError(
             f"initial_std={std} is out of reach: within its limits the {config.family} policy can execute standard "
             f"deviations between {smallest:.4g} and {largest:.4g} of half the action range"
         )
-    if config.family == "beta":
-        excess = (1 / std**2 - 1) / 2 - 1  # α − 1, from sd² = 1/(2α + 1)
-        pre_activation = excess + math.log(-math.expm1(-excess))  # softplus⁻¹
-        return pre_activation, pre_activation
-    log_scale = brentq(
-        lambda s: executed_std(config.family, math.exp(s)) - std,
-        limits.log_std_min,
-        limits.log_std_max,
-        xtol=1e-14,
-    )
-    return 0.0, log_scale
+    return family.head_bias(std, config.limits)

@@ -1,4 +1,4 @@
-r"""The policy families: a law for the latent and a map to the action.
+r"""The policy families, and one of them bound to a box.
 
 | Family             | Law of the latent         | Unit action in [−1, 1]       | Entropy in a bonus      |
 |--------------------|---------------------------|------------------------------|-------------------------|
@@ -16,9 +16,7 @@ half its range, which no gradient sees.
 
 from __future__ import annotations
 
-import functools
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
 from typing import Any
@@ -26,189 +24,29 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.special import betaincinv
 from torch import Tensor
-from torch.autograd.function import once_differentiable
-from torch.distributions import Distribution, Normal
+from torch.distributions import Distribution
 
-from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta, trapezoid
-from inbounds.distributions.scaled_beta import log_beta
-from inbounds.learning.families import family as laws
-from inbounds.learning.families.family import BETA, CLIPPED_NORMAL, NORMAL, Array, Law, Limits, Parameters
+from inbounds.learning.families import beta, clipped_gaussian, gaussian, logit_normal
+from inbounds.learning.families.family import Array, Family, Limits, Parameters
 
 SATURATION_MARGIN = 1e-3
 """Of half the action range: an executed action closer than this to a bound counts as at the bound."""
 
-
-@dataclass(frozen=True)
-class Family:
-    """A row of the table above.
-
-    Args:
-        law: of the latent.
-        to_unit: the map from latents `[..., A]` to unit actions; called with the latents and `xp`.
-        entropy_name: which entropy `entropy` is, in words.
-        entropy: of parameters `[..., A]`, summed over A: `[...]`, in nats.
-        greedy: ways to act without noise, by name: parameters `[..., A]` to unit actions `[..., A]`.
-        distribution: of the action, elementwise: parameters `[..., A]` and the box's low and high `[A]`.
-    """
-
-    law: Law
-    to_unit: Callable[[Array, ModuleType], Array]
-    entropy_name: str
-    entropy: Callable[[Parameters], Tensor]
-    greedy: Mapping[str, Callable[[Parameters], Tensor]]
-    distribution: Callable[[Parameters, Tensor, Tensor], Distribution]
-
-
-def normal_entropy(parameters: Parameters) -> Tensor:
-    """Return Σ_A log σ + ½ log 2πe, `[...]`: the entropy of the latent Normal, in nats.
-
-    Example:
-        >>> round(normal_entropy(Parameters(torch.zeros(2), torch.zeros(2))).item(), 4)  # log 2πe
-        2.8379
-    """
-    log_scale = parameters.second
-    return log_scale.sum(-1) + (0.5 + laws.HALF_LOG_2PI) * log_scale.shape[-1]
-
-
-def logit_normal_entropy(parameters: Parameters) -> Tensor:
-    """Return the entropy `[...]` of the unit action tanh(z/2), in nats: the Normal's plus the map's expected log-slope.
-
-    Within 1e-3 nats of `LogitNormal.entropy` for every log σ ≤ 1, at a twentieth of its cost: a bonus, which is
-    multiplied by 1e-4, need not be exact to the last bit. Differentiable once.
-
-    Example:
-        >>> narrow = Parameters(torch.zeros(1), torch.full((1,), -4.0))  # at 0 the map halves lengths
-        >>> round((normal_entropy(narrow) - logit_normal_entropy(narrow)).item(), 3)  # log 2
-        0.693
-    """
-    log_slope: Tensor = _ExpectedLogSlope.apply(*parameters)
-    return normal_entropy(parameters) + log_slope.sum(-1)
-
-
-class _ExpectedLogSlope(torch.autograd.Function):
-    """E[log ½(1 − tanh²(z/2))] for z ~ Normal, elementwise: by 15 nodes, its gradient by the same nodes.
-
-    With log ½(1 − tanh²(z/2)) = log 2 − 2 (|z|/2 + log(1 + exp(−|z|))) and its derivative −tanh(z/2). In NumPy
-    and with long inner loops, because PPO evaluates it in every minibatch.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, loc: Tensor, log_scale: Tensor) -> Tensor:
-        nodes, weights = _nodes_and_weights(loc.dtype)
-        scale = np.exp(log_scale.numpy()).ravel()
-        half = (
-            nodes[:, None] * scale
-        )  # [N, M], soon z/2; in place, because fresh memory costs more than arithmetic
-        half += loc.numpy().ravel()
-        half *= 0.5
-        slope = np.tanh(half)
-        np.abs(half, out=half)
-        bend = np.exp(-2 * half)
-        bend += 1
-        np.log(bend, out=bend)
-        bend += half
-        log_slope = math.log(2) - 2 * (weights @ bend)
-        to_loc, to_log_scale = -weights @ slope, -(weights * nodes) @ slope * scale
-        ctx.save_for_backward(*(torch.from_numpy(g).view(loc.shape) for g in (to_loc, to_log_scale)))
-        return torch.from_numpy(log_slope).view(loc.shape)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor, Tensor]:
-        to_loc, to_log_scale = ctx.saved_tensors
-        return grads[0] * to_loc, grads[0] * to_log_scale
-
-
-@functools.cache
-def _nodes_and_weights(dtype: torch.dtype) -> tuple[NDArray[Any], NDArray[Any]]:
-    nodes, weights = trapezoid(15, 5.0, dtype)
-    return nodes.numpy(), weights.numpy()
-
-
-def beta_entropy(parameters: Parameters) -> Tensor:
-    """Return the entropy `[...]` of the unit action 2x − 1, in nats: `ScaledBeta.entropy` at half its cost.
-
-    Example:
-        >>> round(beta_entropy(Parameters(torch.ones(1), torch.ones(1))).item(), 4)  # uniform on [−1, 1]: log 2
-        0.6931
-    """
-    alpha, beta = parameters.first.double(), parameters.second.double()
-    digammas = (
-        (alpha - 1) * torch.digamma(alpha)
-        + (beta - 1) * torch.digamma(beta)
-        - (alpha + beta - 2) * torch.digamma(alpha + beta)
-    )
-    entropy = log_beta(alpha, beta) - digammas + math.log(2)
-    return entropy.sum(-1).to(parameters.first.dtype)
-
-
-def beta_median(parameters: Parameters) -> Tensor:
-    """Return the medians `[..., A]` of unit actions 2x − 1, by SciPy: torch has no inverse of the incomplete beta."""
-    alpha, beta = (x.detach().double() for x in parameters)
-    half = torch.from_numpy(np.asarray(betaincinv(alpha.numpy(), beta.numpy(), 0.5)))
-    return (2 * half - 1).to(parameters.first.dtype)
-
-
-def _in_box(parameters: Parameters, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
-    """Return location and scale of a Normal latent in the robot's units."""
-    half_range = (high - low) / 2
-    return (low + high) / 2 + half_range * parameters.first, half_range * parameters.second.exp()
-
-
-def _logit_normal(parameters: Parameters) -> LogitNormal:
-    return LogitNormal(parameters.first, parameters.second.exp(), -1.0, 1.0, validate_args=False)
-
-
 FAMILIES: Mapping[str, Family] = MappingProxyType(
-    {
-        "gaussian": Family(
-            law=NORMAL,
-            to_unit=lambda latent, xp: latent,
-            entropy_name="differential entropy of the unclipped Normal",
-            entropy=normal_entropy,
-            greedy={name: lambda p: p.first for name in ("mean", "median", "mode")},
-            distribution=lambda p, low, high: Normal(*_in_box(p, low, high)),
-        ),
-        "clipped-gaussian": Family(
-            law=CLIPPED_NORMAL,
-            to_unit=lambda latent, xp: laws.clip(latent, -1.0, 1.0),
-            entropy_name="entropy of the mixed law of the clipped unit action",
-            entropy=lambda p: laws.clipped_normal(p).entropy().sum(-1),
-            greedy={
-                "mean": lambda p: laws.clipped_normal(p).mean,
-                "median": lambda p: laws.clipped_normal(p).median,
-                "mode": lambda p: laws.clipped_normal(p).mode,
-            },
-            distribution=lambda p, low, high: ClippedNormal(*_in_box(p, low, high), low, high),
-        ),
-        "beta": Family(
-            law=BETA,
-            to_unit=lambda latent, xp: 2 * latent - 1,
-            entropy_name="differential entropy of the unit action",
-            entropy=beta_entropy,
-            greedy={
-                "mean": lambda p: laws.scaled_beta(p).mean,
-                "median": beta_median,
-                "mode": lambda p: laws.scaled_beta(p).mode,
-            },
-            distribution=lambda p, low, high: ScaledBeta(*p, low, high),
-        ),
-        "logit-normal": Family(
-            law=NORMAL,
-            to_unit=lambda latent, xp: xp.tanh(latent / 2),
-            entropy_name="differential entropy of the unit action",
-            entropy=logit_normal_entropy,
-            greedy={
-                "mean": lambda p: _logit_normal(p).mean,
-                "median": lambda p: _logit_normal(p).median,
-                "mode": lambda p: _logit_normal(p).mode,
-            },
-            distribution=lambda p, low, high: LogitNormal(p.first, p.second.exp(), low, high),
-        ),
-    }
+    {module.FAMILY.name: module.FAMILY for module in (gaussian, clipped_gaussian, beta, logit_normal)}
 )
+
+
+def family_of(name: str) -> Family:
+    """Return the family of a name.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if name not in FAMILIES:
+        raise ValueError(f"no policy family {name!r}; choose one of {', '.join(FAMILIES)}")
+    return FAMILIES[name]
 
 
 @dataclass(frozen=True)
@@ -233,11 +71,11 @@ class PolicyConfig:
     """Executed noise before training, in units of half the action range; None leaves the head's bias as it is."""
 
     def __post_init__(self) -> None:
-        if self.family not in FAMILIES:
-            raise ValueError(f"no policy family {self.family!r}; choose one of {', '.join(FAMILIES)}")
-        if self.family == "beta" and not self.state_dependent_std:
+        names = family_of(self.family).law.named.names()
+        if "log_scale" not in names and not self.state_dependent_std:
             raise ValueError(
-                "a Beta has no scale to set free of the state: use state_dependent_std=True with beta"
+                f"{self.family} has {' and '.join(names)}, and no scale to set free of the state: use it with "
+                "state_dependent_std=True"
             )
 
 
@@ -300,7 +138,7 @@ class Policy:
         Args:
             outputs: `[..., 2A]` of the policy network.
         """
-        parameters = Parameters(*(x.double() for x in self.parameters(outputs)))
+        parameters = self.parameters(outputs).each(Tensor.double)
         return self.family.distribution(parameters, torch.from_numpy(self.low), torch.from_numpy(self.high))
 
     def entropy(self, outputs: Tensor) -> Tensor:

@@ -89,7 +89,8 @@ def error_of_beta_fisher() -> float:
             sides.append(networks.parameters(obs))
     along = [(up - down) / 2e-5 for up, down in zip(*sides, strict=True)]
     own = sum(torch.polygamma(1, x) * d**2 for x, d in zip(here, along, strict=True))
-    shared = torch.polygamma(1, here.first + here.second) * sum(along) ** 2
+    alpha, beta = here
+    shared = torch.polygamma(1, alpha + beta) * sum(along) ** 2
     return abs(product.item() / ((own - shared).sum() / obs.shape[1]).item() - 1)
 
 
