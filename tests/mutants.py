@@ -248,7 +248,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "robots/rendering.py",
         "        headless.require_backend()\n",
         "",
-        "tests/robots/test_headless.py::test_mujoco_imported_too_early_is_an_error_not_a_crash",
+        "tests/test_headless.py::test_mujoco_imported_too_early_is_an_error_not_a_crash",
     ),
     Mutant(
         "drawing changes the simulation's model",
@@ -378,7 +378,7 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "a stored policy is unnormalised",
-        "learning/storage/run_store.py",
+        "learning/training.py",
         "normalizer.squares / max(normalizer.count, 1)",
         "normalizer.squares.copy()",
         "tests/learning/storage/test_run_store.py::test_a_policy_acts_as_its_network_did_in_training",

@@ -9,7 +9,7 @@ Importing the package is light: no Jupyter, Bokeh or mediapy. On Linux without a
 MuJoCo's off-screen backend, which has to happen before ``mujoco`` is imported for the first time.
 """
 
-from inbounds.robots.headless import choose_backend
+from inbounds.headless import choose_backend
 
 __version__ = "0.1.0"
 

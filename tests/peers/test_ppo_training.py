@@ -33,15 +33,9 @@ def trained() -> tuple[Trainer, list, dict]:
     )
     trainer, rollouts = Trainer(config), []
     first = {seed: our_weights(trainer.networks, row) for row, seed in enumerate(SEEDS)}
-    collect = trainer.collector.collect
-
-    def remember(horizon: int):
-        rollouts.append(collect(horizon))
-        return rollouts[-1]
-
-    trainer.collector.collect = remember
     for _ in range(EPOCHS):
         trainer.epoch()
+        rollouts.append(trainer.rollout)
     assert sum(int(rollout.truncated[0].sum()) for rollout in rollouts) == 2
     return trainer, rollouts, first
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -20,12 +20,10 @@ from torch import Tensor
 
 from inbounds.learning.advantages import gae
 from inbounds.learning.families.family import Parameters
-from inbounds.learning.families.policy import SATURATION_MARGIN
+from inbounds.learning.families.policy import SATURATION_MARGIN, ActionMode
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.networks.normalizer import RunningNormalizer
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
-
-ActionMode = Literal["clip", "raw"]
 
 
 @dataclass(frozen=True)
@@ -116,11 +114,6 @@ class Collector:
         self.dtype = np.dtype(str(networks.dtype).removeprefix("torch."))
         self.obs_dim = gymnasium.spaces.flatdim(envs.single_observation_space)
         self.normalizer = RunningNormalizer(len(streams), self.obs_dim, self.dtype) if normalize_obs else None
-        self.action_dtype = envs.single_action_space.dtype
-        self.low, self.high, self.centre = (
-            bound.astype(self.action_dtype)
-            for bound in (self.policy.low, self.policy.high, self.policy.centre)
-        )
         self.returns = np.zeros(len(streams))  # of the episodes under way
         self.restart()
 
@@ -145,7 +138,7 @@ class Collector:
         draw = self.policy.law.sampler([s.noise for s in self.streams], horizon, act_dim, self.dtype)
         obs = np.empty((num_seeds, horizon, self.obs_dim), self.dtype)
         latent = np.empty((num_seeds, horizon, act_dim), self.dtype)
-        action = np.empty((num_seeds, horizon, act_dim), self.action_dtype)
+        action = np.empty((num_seeds, horizon, act_dim), self.policy.dtype)
         reward = np.empty((num_seeds, horizon))
         terminated = np.empty((num_seeds, horizon), np.bool_)
         truncated = np.empty((num_seeds, horizon), np.bool_)
@@ -156,7 +149,7 @@ class Collector:
                 obs[:, t] = self.obs
                 parameters = self.policy.parameters(self.networks.actor.act(self.obs), np)
                 latent[:, t] = z = draw(parameters, t)
-                action[:, t] = executed = self._executed(z)
+                action[:, t] = executed = self.policy.execute(z, self.action_mode)
                 next_obs, reward[:, t], terminated[:, t], truncated[:, t], info = self.envs.step(executed)
                 self.returns += reward[:, t]
                 if (over := terminated[:, t] | truncated[:, t]).any():
@@ -177,15 +170,6 @@ class Collector:
             return obs.astype(self.dtype)
         self.normalizer.update(obs)
         return self.normalizer(obs)
-
-    def _executed(self, latent: NDArray[Any]) -> NDArray[Any]:
-        """Return the actions for latents `[S, A]`; a diverged seed holds still, in the middle of its box."""
-        action = self.policy.action(latent).astype(self.action_dtype)
-        if self.action_mode == "clip":
-            action = np.minimum(np.maximum(action, self.low), self.high)
-        if not np.isfinite(action).all():
-            action = np.where(np.isfinite(action), action, self.centre)
-        return action
 
     def _end_episodes(self, over: NDArray[np.bool_], episode_returns: list[list[float]]) -> None:
         for s in np.flatnonzero(over):

@@ -19,26 +19,25 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import gymnasium
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from numpy.typing import NDArray
 
+from inbounds import robots
 from inbounds.learning.config import ALGORITHMS, TrainConfig
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
-from inbounds.learning.rollout import Collector, Rollout
+from inbounds.learning.rollout import Collector, Rollout, check_environments
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.files import held
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, describe, differences
+from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.robots.registration import TASK_NAMES
-from inbounds.robots.registration import make as make_robots
-
-if TYPE_CHECKING:
-    from inbounds.learning.storage.trained_policy import TrainedPolicy
 
 Record: TypeAlias = dict[str, Any]
 """One epoch: `epoch`, `env_steps` (per seed, so far), `seconds` of wall time, and arrays `[S]` by name."""
@@ -73,13 +72,9 @@ class Trainer:
         self.streams = [SeedStreams.of(seed) for seed in config.seeds]
         num_seeds = len(config.seeds)
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
-        space = self.envs.single_action_space
-        if not isinstance(space, gymnasium.spaces.Box):
-            raise ValueError(
-                f"actions must be a bounded, one-dimensional Box, got {space}: wrap the environment "
-                "(gymnasium.wrappers.RescaleAction, FlattenAction) so that they are"
-            )
-        policy = Policy(config.policy, space.low, space.high)
+        check_environments(self.envs, num_seeds)
+        box: Any = self.envs.single_action_space
+        policy = Policy(config.policy, box.low, box.high)
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
         with one_thread():  # orthogonal initial weights depend on the number of threads, in their last bits
@@ -89,6 +84,8 @@ class Trainer:
         )
         self._algorithm = ALGORITHMS[config.algorithm_name][1]
         self.optimizer = self._algorithm.make_optimizer(self.networks, config.algorithm)
+        self.rollout: Rollout | None = None
+        """What the last epoch learned from."""
         self.records: list[Record] = []
         self.diverged = np.zeros(num_seeds, np.bool_)
 
@@ -96,8 +93,9 @@ class Trainer:
         """Collect one rollout, do one update, and return the record, which also joins `records`."""
         start = time.perf_counter()
         algorithm = self.config.algorithm
+        self.rollout = None  # two would take twice the memory
         with one_thread():
-            rollout = self.collector.collect(algorithm.horizon)
+            self.rollout = rollout = self.collector.collect(algorithm.horizon)
             shuffles = [stream.shuffle for stream in self.streams]
             diagnostics = self._algorithm.update(self.networks, self.optimizer, rollout, shuffles, algorithm)
         self._mark_diverged(rollout)
@@ -123,7 +121,7 @@ class Trainer:
             (
                 now & ~self.diverged & ~received,
                 "mend the environment, which has returned an observation or a reward that is no finite number "
-                "(inbounds.book.environment_checks looks for more)",
+                "(gymnasium.utils.env_checker.check_env looks for more)",
             ),
         ):
             if new.any():
@@ -144,9 +142,24 @@ class Trainer:
     @property
     def policies(self) -> list[TrainedPolicy]:
         """What has been learned so far, one policy per seed, ready to act without the trainer."""
-        from inbounds.learning.storage.run_store import policies_of  # imports this module
+        return policies_from(self.config, self.tensors())
 
-        return policies_of(self)
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """Return what the policies are made of, S seeds in the order of the configuration.
+
+        `policy.i.weight` `[S, out, in]`, `policy.i.bias` `[S, out]`, `normalizer.mean` and `normalizer.variance`
+        `[S, O]` where the run normalises observations, `action.low` and `action.high` `[A]`, `diverged` `[S]`.
+        """
+        box: Any = self.envs.single_action_space
+        tensors = {n: t.numpy() for n, t in self.networks.actor.named_tensors("policy").items()}
+        if (normalizer := self.collector.normalizer) is not None:
+            tensors["normalizer.mean"] = normalizer.mean.copy()
+            tensors["normalizer.variance"] = normalizer.squares / max(normalizer.count, 1)
+        return tensors | {
+            "action.low": box.low.copy(),
+            "action.high": box.high.copy(),
+            "diverged": self.diverged.copy(),
+        }
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the future depends on, and the records so far; later epochs leave it as it is."""
@@ -249,7 +262,7 @@ def make_environments(config: TrainConfig, num_envs: int) -> Environments:
         A vector environment that resets in the step that ends an episode.
     """
     if config.env.removeprefix("inbounds/") in TASK_NAMES:
-        return make_robots(config.env, num_envs, action_mode=config.action_mode)
+        return robots.make(config.env, num_envs, action_mode=config.action_mode)
     return SyncVectorEnv(
         [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
     )

@@ -1,16 +1,16 @@
 """Where actions are executed: MuJoCo's robots, stepped in one batch and drawn without a display.
 
-Names are imported on first use, because ``import inbounds`` passes through this package to choose the off-screen
-backend (:mod:`inbounds.robots.headless`), and that has to happen before ``mujoco`` is imported.
+Names are imported on first use: what steps no robots, such as a policy that is loaded to act, need not load MuJoCo.
 """
 
 import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from inbounds.robots.registration import NAMESPACE
+
 if TYPE_CHECKING:
     from inbounds.robots.messages import MujocoWarning
-    from inbounds.robots.registration import make
     from inbounds.robots.rendering import Camera, Film, RobotRenderer, record
     from inbounds.robots.vector_env import TASKS, RobotVectorEnv
 
@@ -21,11 +21,34 @@ _HOME = {
     "MujocoWarning": "messages",
     "RobotRenderer": "rendering",
     "RobotVectorEnv": "vector_env",
-    "make": "registration",
     "record": "rendering",
 }
 
 __all__ = ["TASKS", "Camera", "Film", "MujocoWarning", "RobotRenderer", "RobotVectorEnv", "make", "record"]
+
+
+def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
+    """Return robots with one of the six tasks, in one vector environment.
+
+    Args:
+        name: of the task, such as ``"HalfCheetah-v5"``.
+        num_envs: number of robots.
+        **kwargs: as for :class:`inbounds.robots.RobotVectorEnv`.
+
+    Returns:
+        The environment.
+
+    Raises:
+        ValueError: an argument is not one of those that the class names.
+
+    Example:
+        >>> envs = make("Hopper-v5", num_envs=10)
+        >>> envs.reset(seed=0)[0].shape
+        (10, 11)
+    """
+    from inbounds.robots import RobotVectorEnv
+
+    return RobotVectorEnv(name.removeprefix(f"{NAMESPACE}/"), num_envs, **kwargs)
 
 
 def __getattr__(name: str) -> Any:

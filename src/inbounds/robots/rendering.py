@@ -17,7 +17,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from inbounds.robots import headless, messages
+from inbounds import headless
+from inbounds.robots import messages
 
 messages.install_handler()
 

@@ -95,14 +95,8 @@ class Players:
         seen = by_seed.astype(collector.dtype) if normalizer is None else normalizer(by_seed)
         outputs = networks.outputs(torch.from_numpy(seen.swapaxes(0, 1))).flatten(0, 1)  # [S·E, 2A]
         if way == "sample":
-            draw = policy.law.sampler(generators, 1, policy.act_dim, collector.dtype)
-            action = policy.action(draw(policy.parameters(outputs.numpy(), np), 0))
-            if collector.action_mode == "clip":
-                action = np.clip(action, policy.low, policy.high)
-        else:
-            action = policy.greedy(outputs, way)
-        action = action.astype(collector.action_dtype)
-        return np.where(np.isfinite(action), action, collector.centre)  # a diverged seed holds still
+            return policy.sample(outputs.numpy(), generators, collector.action_mode)
+        return policy.greedy(outputs, way)
 
     def close(self) -> None:
         """Close the environments."""

@@ -66,9 +66,6 @@ class MeasuredTrainer:
         self.progress = Progress()
         self.trainer = Trainer(self.config)
         self.evaluation = GreedyEvaluation(self.trainer)
-        self._collect = self.trainer.collector.collect
-        self._rollout: Rollout | None = None
-        self.trainer.collector.collect = self._watch  # type: ignore[method-assign]  # an epoch keeps no rollout
 
     @property
     def done(self) -> int:
@@ -83,7 +80,7 @@ class MeasuredTrainer:
             )  # it is in the rows, and what to do is in the protocol
             record = self.trainer.epoch()
         self.progress.seconds["training"] += record["seconds"]
-        rollout, self._rollout = self._rollout, None
+        rollout = self.trainer.rollout
         assert rollout is not None
         if self.done == 1:
             self.progress.first_rewards = rollout.reward[:, :FIRST_STEPS].double().numpy().copy()
@@ -93,10 +90,6 @@ class MeasuredTrainer:
     def table(self) -> pa.Table:
         """Return the rows so far."""
         return store.table_of(self.config, self.trainer.records, self.progress.measurements)
-
-    def _watch(self, horizon: int) -> Rollout:
-        self._rollout = self._collect(horizon)
-        return self._rollout
 
     def _measure(self, record: Mapping[str, Any], rollout: Rollout) -> None:
         start = time.perf_counter()

@@ -16,10 +16,10 @@ half its range, which no gradient sees.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import torch
@@ -29,6 +29,8 @@ from torch.distributions import Distribution
 
 from inbounds.learning.families import beta, clipped_gaussian, gaussian, logit_normal
 from inbounds.learning.families.family import Array, Family, Limits, Parameters
+
+ActionMode: TypeAlias = Literal["clip", "raw"]
 
 SATURATION_MARGIN = 1e-3
 """Of half the action range: an executed action closer than this to a bound counts as at the bound."""
@@ -100,6 +102,7 @@ class Policy:
     """
 
     def __init__(self, config: PolicyConfig, low: NDArray[Any], high: NDArray[Any]) -> None:
+        self.dtype = np.result_type(np.asarray(low), np.float16)  # of executed actions, the box's
         low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
         if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low) & np.isfinite(high)).all():
             raise ValueError(
@@ -114,6 +117,7 @@ class Policy:
         self.low, self.high = low, high
         self.act_dim = len(low)
         self.centre, self.half_range = (high + low) / 2, (high - low) / 2
+        self._as_executed = [bound.astype(self.dtype) for bound in (low, high, self.centre)]
 
     def parameters(self, outputs: Array, xp: ModuleType = torch) -> Parameters:
         """Return the law's parameters `[..., A]` for network outputs `[..., 2A]`."""
@@ -128,6 +132,33 @@ class Policy:
         unit = self.unit_action(latent)
         centre, half_range = self.centre.astype(unit.dtype), self.half_range.astype(unit.dtype)
         return centre + half_range * unit
+
+    def execute(self, latent: NDArray[Any], mode: ActionMode = "clip") -> NDArray[Any]:
+        """Return the action `[..., A]` that the robot receives for latents `[..., A]`, in the box's precision.
+
+        A diverged policy, whose latents are NaN, holds still in the middle of its box.
+
+        Args:
+            latent: what the law drew.
+            mode: "clip" to the box, or "raw", as it was drawn.
+        """
+        return self._executed(self.action(latent), mode)
+
+    def _executed(self, action: NDArray[Any], mode: ActionMode) -> NDArray[Any]:
+        low, high, centre = self._as_executed
+        action = action.astype(self.dtype)
+        if mode == "clip":
+            action = np.minimum(np.maximum(action, low), high)
+        if not np.isfinite(action).all():
+            action = np.where(np.isfinite(action), action, centre)
+        return action
+
+    def sample(
+        self, outputs: NDArray[Any], generators: Sequence[np.random.Generator], mode: ActionMode = "clip"
+    ) -> NDArray[Any]:
+        """Return an action `[B, A]` to execute for each row of the network's outputs `[B, 2A]`, by a generator each."""
+        draw = self.law.sampler(generators, 1, self.act_dim, outputs.dtype)
+        return self.execute(draw(self.parameters(outputs, np), 0), mode)
 
     def distribution(self, outputs: Tensor) -> Distribution:
         """Return the distribution of the action, elementwise `[..., A]`, in the robot's units and in float64.
@@ -146,7 +177,7 @@ class Policy:
         return self.family.entropy(self.parameters(outputs))
 
     def greedy(self, outputs: Tensor, by: str) -> NDArray[Any]:
-        """Return the greedy action `[..., A]` within the box, in the robot's units.
+        """Return the greedy action `[..., A]` to execute, within the box and in its precision.
 
         Args:
             outputs: `[..., 2A]` of the policy network.
@@ -161,4 +192,4 @@ class Policy:
             )
         with torch.no_grad():
             unit = self.family.greedy[by](self.parameters(outputs)).numpy()
-        return np.clip(self.centre + self.half_range * unit, self.low, self.high)
+        return self._executed(self.centre + self.half_range * unit, "clip")

@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -25,8 +25,7 @@ from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.files import damaged, find, write_whole
 from inbounds.learning.storage.run_files import METADATA_KEY, config_from, metadata_of
-from inbounds.learning.storage.trained_policy import TrainedPolicy
-from inbounds.learning.training import Record, Trainer
+from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 
 CHECKPOINT_FILE = checkpoint.FILE_NAME
 CURVES_FILE = "curves.parquet"
@@ -56,7 +55,21 @@ COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {
 """Column → type and meaning, in order; a run has those that its algorithm records."""
 
 
-def save_run(run_dir: str | Path, trainer: Trainer) -> None:
+class Run(Protocol):
+    """What is asked of an `inbounds.learning.Trainer`."""
+
+    config: TrainConfig
+    records: list[dict[str, Any]]
+
+    @property
+    def policies(self) -> list[TrainedPolicy]:
+        """One per seed."""
+
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """What the policies are made of, by name."""
+
+
+def save_run(run_dir: str | Path, trainer: Run) -> None:
     """Write the curves and the policies of a run as it stands.
 
     Args:
@@ -70,7 +83,7 @@ def save_run(run_dir: str | Path, trainer: Trainer) -> None:
 # ---- learning curves
 
 
-def write_curves(path: str | Path, config: TrainConfig, records: Sequence[Record]) -> None:
+def write_curves(path: str | Path, config: TrainConfig, records: Sequence[Mapping[str, Any]]) -> None:
     """Write records as a Parquet table, one row per epoch × seed, epoch by epoch.
 
     Floats are stored without loss, their bytes split into streams and compressed by zstd. The schema carries the
@@ -143,7 +156,7 @@ def config_of(curves: pa.Table) -> TrainConfig:
 # ---- policies
 
 
-def policies_of(trainer: Trainer) -> list[TrainedPolicy]:
+def policies_of(trainer: Run) -> list[TrainedPolicy]:
     """Return the policies of a run as it stands, one per seed; later training does not change them.
 
     Args:
@@ -155,22 +168,17 @@ def policies_of(trainer: Trainer) -> list[TrainedPolicy]:
         >>> policies_of(run)[1].act(np.zeros(8)).shape
         (2,)
     """
-    tensors = _tensors(trainer)
-    return [TrainedPolicy.from_tensors(trainer.config, tensors, i) for i in range(len(trainer.config.seeds))]
+    return trainer.policies
 
 
-def save_policies(path: str | Path, trainer: Trainer) -> None:
-    """Write the policies of all seeds of a run to a safetensors file.
-
-    Tensors (S seeds in the order of the configuration): `policy.i.weight` `[S, out, in]`, `policy.i.bias` `[S, out]`,
-    `normalizer.mean` and `normalizer.variance` `[S, O]` where the run normalises observations, `action.low` and
-    `action.high` `[A]`, `diverged` `[S]`.
+def save_policies(path: str | Path, trainer: Run) -> None:
+    """Write the policies of all seeds of a run to a safetensors file, under the names of `Trainer.tensors`.
 
     Args:
         path: of the file; its folder must exist.
         trainer: the run.
     """
-    tensors = _tensors(trainer)
+    tensors = trainer.tensors()
     metadata = metadata_of(trainer.config, sha256=_digest(tensors))
     write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
 
@@ -203,8 +211,7 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
         raise damaged(path, error) from error
     if metadata.get("sha256") != _digest(tensors):
         raise damaged(path, "its checksum is wrong")
-    config = config_from(metadata)
-    return [TrainedPolicy.from_tensors(config, tensors, i) for i in range(len(config.seeds))]
+    return policies_from(config_from(metadata), tensors)
 
 
 def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
@@ -239,20 +246,6 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
             f"the run has {len(policies)} seeds: choose a seed index from 0 to {len(policies) - 1}"
         )
     return policies[seed_index]
-
-
-def _tensors(trainer: Trainer) -> dict[str, NDArray[Any]]:
-    space = trainer.envs.single_action_space
-    weights = trainer.networks.actor.named_tensors("policy")
-    tensors = {name: tensor.numpy() for name, tensor in weights.items()}
-    if (normalizer := trainer.collector.normalizer) is not None:
-        tensors["normalizer.mean"] = normalizer.mean.copy()
-        tensors["normalizer.variance"] = normalizer.squares / max(normalizer.count, 1)
-    return tensors | {
-        "action.low": space.low.copy(),  # type: ignore[attr-defined]  # a Trainer has seen to it that it is a Box
-        "action.high": space.high.copy(),  # type: ignore[attr-defined]
-        "diverged": trainer.diverged.copy(),
-    }
 
 
 def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:

@@ -55,7 +55,7 @@ class TrainedPolicy:
     def from_tensors(
         cls, config: TrainConfig, tensors: Mapping[str, NDArray[Any]], index: int
     ) -> TrainedPolicy:
-        """Take one seed out of the tensors of a run (`inbounds.learning.storage.run_store.save_policies` names them).
+        """Take one seed out of the tensors of a run (`inbounds.learning.Trainer.tensors` names them).
 
         Args:
             config: of the run.
@@ -104,7 +104,8 @@ class TrainedPolicy:
             rng: where "sample" draws from; None is a generator seeded by the system.
 
         Returns:
-            `[A]` or `[B, A]`, in the robot's units, within the box (a sample under `action_mode="raw"` may leave it).
+            `[A]` or `[B, A]`, in the robot's units, within the box (a sample under `action_mode="raw"` may leave it);
+            the middle of the box from a diverged policy.
 
         Raises:
             ValueError: observations of another size or not finite, or a greedy action that the family
@@ -112,7 +113,8 @@ class TrainedPolicy:
         """
         outputs, shape = self._outputs(obs)
         if greedy == "sample":
-            action = self._sample(outputs, np.random.default_rng() if rng is None else rng)
+            rng = np.random.default_rng() if rng is None else rng
+            action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
         elif greedy in self.greedy_choices:
             action = self._policy.greedy(torch.from_numpy(outputs), greedy)
         else:
@@ -120,7 +122,7 @@ class TrainedPolicy:
                 f"{self.config.policy.family} does not act by {greedy!r}: "
                 f"choose one of {', '.join(self.greedy_choices)}"
             )
-        return action.astype(self.low.dtype).reshape(shape)
+        return action.reshape(shape)
 
     def distribution(self, obs: NDArray[Any]) -> Distribution:
         """Return the distribution of the action in each state: its parameters, its density, its samples, in torch.
@@ -164,7 +166,7 @@ class TrainedPolicy:
         outputs = self._network.act(seen)  # the weights of one seed serve every row
         return outputs, (*obs.shape[:-1], len(self.low))
 
-    def _sample(self, outputs: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
-        draw = self._policy.law.sampler([rng] * len(outputs), 1, self._policy.act_dim, self._dtype)
-        action = self._policy.action(draw(self._policy.parameters(outputs, np), 0))
-        return np.clip(action, self.low, self.high) if self.config.action_mode == "clip" else action
+
+def policies_from(config: TrainConfig, tensors: Mapping[str, NDArray[Any]]) -> list[TrainedPolicy]:
+    """Return the policies in the tensors of a run, one per seed."""
+    return [TrainedPolicy.from_tensors(config, tensors, i) for i in range(len(config.seeds))]

@@ -65,7 +65,7 @@ def test_a_display_needs_no_choice(variable, tmp_path):
 
 @pytest.mark.parametrize("platform", ["darwin", "win32"])
 def test_other_systems_need_no_choice(platform, tmp_path):
-    code = "import sys; from inbounds.robots import headless; import os; os.environ.pop('MUJOCO_GL', None);"
+    code = "import sys; from inbounds import headless; import os; os.environ.pop('MUJOCO_GL', None);"
     code += f"sys.platform = {platform!r}; print(headless.choose_backend())"
     assert run(code, tmp_path).strip() == "None"
 
