@@ -594,6 +594,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/learning/test_own_environment.py::test_a_box_is_a_choice_of_units",
     ),
     Mutant(
+        "a diverged policy acts by NaN",
+        "learning/families/policy.py",
+        "action = np.where(np.isfinite(action), action, centre)",
+        "pass",
+        "tests/learning/families/test_policies.py::test_what_is_executed_is_in_the_box_in_its_precision_and_a_diverged_policy_holds_still",
+    ),
+    Mutant(
         "a distribution keeps the unit interval's scale",
         "learning/families/gaussian.py",
         "half_range * parameters.loc, half_range * parameters.log_scale.exp()",

@@ -110,13 +110,14 @@ def loss(networks: ActorCritic, batch: Minibatch, config: PPOConfig) -> Tensor:
         −L, a scalar.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
-        >>> rollout = trainer.collector.collect(64)
-        >>> advantage, return_ = rollout.advantages(gamma=0.99, gae_lambda=0.95)
-        >>> (batch,) = minibatches(rollout, advantage, return_, 64, [np.random.default_rng(s) for s in (0, 1)], True)
-        >>> loss(trainer.networks, batch, PPOConfig()).shape
-        torch.Size([])
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> obs, latent = torch.ones(2, 64, 3), torch.zeros(2, 64, 1)
+        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
+        >>> batch = Minibatch(obs, latent, log_prob, torch.ones(2, 64), return_=networks.values(obs).detach())
+        >>> loss(networks, batch, PPOConfig(entropy_coef=0.0)).item()  # ratios 1, values right: −1 for each seed
+        -2.0
     """
     policy = networks.policy
     parameters = networks.parameters(batch.obs)

@@ -31,6 +31,7 @@ from inbounds.learning.networks.perceptron import flatten
 from inbounds.learning.rollout import Rollout
 from inbounds.learning.updates.checks import check, check_minibatches
 from inbounds.learning.updates.diagnostics import diagnose
+from inbounds.learning.updates.minibatches import Minibatch
 from inbounds.learning.updates.value import fit_values
 
 Product = Callable[[Tensor], Tensor]
@@ -106,10 +107,11 @@ def kl_hessian_product(networks: ActorCritic, obs: Tensor) -> Product:
         The product, for v `[S, P]` in the order of `actor.theta`.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", policy="beta", algo="trpo", seeds=2))
-        >>> product = kl_hessian_product(trainer.networks, trainer.collector.collect(64).obs)
-        >>> v = torch.ones_like(trainer.networks.actor.theta)
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("beta"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> product = kl_hessian_product(networks, obs=torch.ones(2, 64, 3))
+        >>> v = torch.ones_like(networks.actor.theta)
         >>> bool((dot(v, product(v)) > 0).all())  # [S, 1] vᵀFv
         True
     """
@@ -141,12 +143,13 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
         The product, for v `[S, P]` in the order of `actor.theta`.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
-        >>> rollout = trainer.collector.collect(64)
-        >>> product = sampled_fisher_product(trainer.networks, rollout.obs, rollout.latent)
-        >>> product(torch.zeros_like(trainer.networks.actor.theta)).abs().max().item()
-        0.0
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> product = sampled_fisher_product(networks, obs=torch.ones(2, 64, 3), latent=torch.ones(2, 64, 1))
+        >>> v = torch.ones_like(networks.actor.theta)
+        >>> bool((dot(v, product(v)) > 0).all())
+        True
     """
     weights = networks.actor.parameters
     log_prob = networks.policy.law.log_prob(networks.parameters(obs), latent)
@@ -205,27 +208,31 @@ def dot(a: Tensor, b: Tensor) -> Tensor:
 
 
 def surrogate(
-    networks: ActorCritic, rollout: Rollout, advantage: Tensor, entropy_coef: float
+    networks: ActorCritic, steps: Rollout | Minibatch, advantage: Tensor, entropy_coef: float
 ) -> tuple[Tensor, Parameters]:
     """Return E[r Â] + c_H E[H] of each seed, `[S]`, and the law's parameters `[S, T, A]`.
 
     Args:
         networks: the policies whose surrogate it is.
-        rollout: `[S, T, ...]`, with the log-densities of the policies that drew it.
+        steps: `[S, T, ...]`, with the log-densities of the policies that drew them.
         advantage: `[S, T]`.
         entropy_coef: c_H, per nat.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
-        >>> rollout = trainer.collector.collect(64)
-        >>> objective, _ = surrogate(trainer.networks, rollout, torch.ones(2, 64), entropy_coef=0.0)
-        >>> objective.detach().numpy().round(4).tolist()  # all ratios are 1 at the policies that drew it
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
+        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
+        >>> advantage = torch.ones(2, 64)
+        >>> steps = Minibatch(obs, latent, log_prob, advantage, return_=advantage)
+        >>> objective, _ = surrogate(networks, steps, advantage, entropy_coef=0.0)
+        >>> objective.tolist()  # all ratios are 1 at the policies that drew it
         [1.0, 1.0]
     """
     policy = networks.policy
-    parameters = networks.parameters(rollout.obs)
-    ratio = torch.exp(policy.law.log_prob(parameters, rollout.latent) - rollout.log_prob)
+    parameters = networks.parameters(steps.obs)
+    ratio = torch.exp(policy.law.log_prob(parameters, steps.latent) - steps.log_prob)
     objective = ratio * advantage
     if entropy_coef:
         objective = objective + entropy_coef * policy.family.entropy(parameters)
@@ -243,15 +250,19 @@ class LineSearch(NamedTuple):
 
 @torch.no_grad()
 def line_search(
-    networks: ActorCritic, rollout: Rollout, advantage: Tensor, step: Tensor, config: TRPOConfig
+    networks: ActorCritic,
+    steps: Rollout | Minibatch,
+    advantage: Tensor,
+    step: Tensor,
+    config: TRPOConfig,
 ) -> LineSearch:
     """Move each policy along its step, as far as the exact KL divergence and the surrogate allow.
 
     A length is accepted if KL(old‖new) ≤ δ and the surrogate improves. A seed that finds none stays where it was.
 
     Args:
-        networks: the policies that drew the rollout; changed in place.
-        rollout: `[S, T, ...]`.
+        networks: the policies that drew the steps; changed in place.
+        steps: `[S, T, ...]`.
         advantage: `[S, T]`.
         step: `[S, P]` full steps.
         config: δ, the factor, the number of tries.
@@ -260,17 +271,20 @@ def line_search(
         The outcome.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
-        >>> rollout, config = trainer.collector.collect(64), TRPOConfig(horizon=64)
-        >>> advantage = normalize_advantage(rollout.advantages(config.gamma, config.gae_lambda)[0])
-        >>> step = natural_step(trainer.networks, rollout, advantage, config)
-        >>> line_search(trainer.networks, rollout, advantage, step, config).accepted
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
+        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
+        >>> advantage, config = latent[..., 0], TRPOConfig()  # the larger the latent, the better
+        >>> steps = Minibatch(obs, latent, log_prob, advantage, return_=advantage)
+        >>> step = natural_step(networks, steps, advantage, config)
+        >>> line_search(networks, steps, advantage, step, config).accepted
         tensor([True, True])
     """
     theta, law = networks.actor.theta, networks.policy.law
     start = theta.clone()
-    before, old = surrogate(networks, rollout, advantage, config.entropy_coef)
+    before, old = surrogate(networks, steps, advantage, config.entropy_coef)
     fraction = torch.zeros(networks.num_seeds, 1, dtype=theta.dtype)
     searching = torch.isfinite(step).all(1, keepdim=True)  # [S, 1]
     for k in range(config.max_backtracks):
@@ -278,7 +292,7 @@ def line_search(
             break
         length = config.backtrack_coef**k
         theta.copy_(torch.where(searching, start + length * step, start + fraction * step.nan_to_num()))
-        objective, new = surrogate(networks, rollout, advantage, config.entropy_coef)
+        objective, new = surrogate(networks, steps, advantage, config.entropy_coef)
         good = (law.kl(old, new).mean(1) <= config.max_kl) & (objective > before)
         fraction = torch.where(searching & good[:, None], length, fraction)
         searching = searching & ~good[:, None]
@@ -286,12 +300,14 @@ def line_search(
     return LineSearch(accepted=(fraction > 0)[:, 0], fraction=fraction[:, 0])
 
 
-def natural_step(networks: ActorCritic, rollout: Rollout, advantage: Tensor, config: TRPOConfig) -> Tensor:
+def natural_step(
+    networks: ActorCritic, steps: Rollout | Minibatch, advantage: Tensor, config: TRPOConfig
+) -> Tensor:
     """Return the full step √(2δ / xᵀFx) · x of each seed, `[S, P]`, with F damped as in the solve.
 
     Args:
-        networks: the policies that drew the rollout.
-        rollout: `[S, T, ...]`.
+        networks: the policies that drew the steps.
+        steps: `[S, T, ...]`.
         advantage: `[S, T]`.
         config: δ, damping, iterations, which Fisher product.
 
@@ -299,19 +315,23 @@ def natural_step(networks: ActorCritic, rollout: Rollout, advantage: Tensor, con
         Steps in the order of `actor.theta`; zero where the gradient is zero.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
-        >>> trainer = Trainer(preset("common", "Hopper-v5", algo="trpo", seeds=2))
-        >>> rollout = trainer.collector.collect(64)
-        >>> step = natural_step(trainer.networks, rollout, torch.zeros(2, 64), TRPOConfig(entropy_coef=0.0))
-        >>> step.shape == trainer.networks.actor.theta.shape, step.abs().max().item()  # no advantage, no step
-        (True, 0.0)
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
+        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
+        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
+        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
+        >>> steps = Minibatch(obs, latent, log_prob, advantage=latent[..., 0], return_=log_prob)
+        >>> step = natural_step(networks, steps, steps.advantage, TRPOConfig(entropy_coef=0.0))
+        >>> product = damped(kl_hessian_product(networks, obs), damping=0.1)
+        >>> (dot(step, product(step)) / 2).flatten().numpy().round(4)  # as long as δ allows: ½ xᵀFx = 0.01
+        array([0.01, 0.01], dtype=float32)
     """
-    objective, _ = surrogate(networks, rollout, advantage, config.entropy_coef)
+    objective, _ = surrogate(networks, steps, advantage, config.entropy_coef)
     gradient = flatten(torch.autograd.grad(objective.sum(), networks.actor.parameters))
     if config.fisher == "hessian":
-        product = kl_hessian_product(networks, rollout.obs)
+        product = kl_hessian_product(networks, steps.obs)
     else:
-        product = sampled_fisher_product(networks, rollout.obs, rollout.latent)
+        product = sampled_fisher_product(networks, steps.obs, steps.latent)
     product = damped(product, config.damping)
     x = conjugate_gradient(product, gradient, config.cg_iters)
     length = (2 * config.max_kl / dot(x, product(x))).sqrt()

@@ -99,6 +99,19 @@ def test_the_clipped_gaussians_distribution_has_its_mass_on_the_bounds() -> None
     assert torch.allclose(mass, bound.law.log_prob(bound.parameters(rows), beyond), atol=1e-9)
 
 
+def test_what_is_executed_is_in_the_box_in_its_precision_and_a_diverged_policy_holds_still() -> None:
+    bound = Policy(PolicyConfig("gaussian"), LOW.astype(np.float32), HIGH.astype(np.float32))
+    latent = np.array([[3.0, 0.5], [np.nan, -3.0]])
+    clipped, raw = bound.execute(latent), bound.execute(latent, "raw")
+    assert clipped.dtype == raw.dtype == np.float32
+    assert clipped.tolist() == [[1.0, 3.5], [-0.5, 0.5]]
+    assert raw.tolist() == [[4.0, 3.5], [-0.5, -3.5]]
+    outputs = np.full((2, 4), np.nan)
+    streams = [np.random.default_rng(s) for s in (0, 1)]
+    assert bound.sample(outputs, streams).tolist() == [[-0.5, 2.5]] * 2
+    assert bound.greedy(torch.from_numpy(outputs), "mean").tolist() == [[-0.5, 2.5]] * 2
+
+
 def test_an_unknown_greedy_action_is_refused_with_the_choices() -> None:
     with pytest.raises(ValueError, match="beta offers the greedy actions mean, median, mode, not 'best'"):
         policy("beta").greedy(torch.zeros(4), "best")

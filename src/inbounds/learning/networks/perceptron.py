@@ -117,7 +117,8 @@ class Mlp:
             part.unflatten(1, shape)
             for part, shape in zip(self.padded.grad[:, :count].split(self._lengths, 1), shapes, strict=True)
         ]
-        self.layers = [SeedLinear(*pair) for pair in zip(*[iter(self.parameters)] * 2, strict=True)]
+        weights, biases = self.parameters[::2], self.parameters[1::2]
+        self.layers = [SeedLinear(*pair) for pair in zip(weights, biases, strict=True)]
         self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
 
     def __call__(self, obs: Tensor) -> Tensor:
