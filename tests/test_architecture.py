@@ -19,7 +19,12 @@ MAY_IMPORT = {
     "book": {"distributions", "robots", "learning", "study"},
     "cli": {"distributions", "robots", "learning", "study", "book"},
 }
+ENGINE = ("distributions", "robots", "learning")
 MODULES = sorted(PACKAGE.rglob("*.py"))
+BY_NAME = {
+    ".".join(("inbounds", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"): path
+    for path in MODULES
+}
 API = (PACKAGE.parents[1] / "book" / "api.md").read_text(encoding="utf8")
 DOCUMENTED = re.findall(r"\.\. auto(?:function|class):: (\S+)", API)
 
@@ -52,6 +57,36 @@ def rooms_imported(path: Path) -> set[str]:
 def test_imports_go_one_way(path: Path) -> None:
     room = room_of(path)
     assert rooms_imported(path) <= MAY_IMPORT[room] | {room}
+
+
+def modules_imported(path: Path) -> set[str]:
+    """Modules of the package that a file imports, wherever in it: below TYPE_CHECKING and in functions, too."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= (names & BY_NAME.keys()) or {node.module}
+    return found & BY_NAME.keys()
+
+
+def test_no_file_of_the_engine_imports_itself_by_way_of_others() -> None:
+    graph = {name: modules_imported(path) - {name} for name, path in BY_NAME.items()}
+    for name in (name for name, path in BY_NAME.items() if room_of(path) in ENGINE):
+        reached, new = set(), graph[name]
+        while new:
+            reached |= new
+            new = set().union(*(graph[other] for other in new)) - reached
+        assert name not in reached
+
+
+@pytest.mark.parametrize("room", ENGINE)
+def test_a_folder_of_the_engine_has_at_most_a_dozen_entries(room: str) -> None:
+    folders = {path.parent for path in (PACKAGE / room).rglob("*.py")}
+    for folder in folders:
+        entries = [entry.name for entry in folder.iterdir() if not entry.name.startswith("__")]
+        assert len(entries) <= 12, (folder.name, entries)
 
 
 @pytest.mark.parametrize(

@@ -142,14 +142,7 @@ def sampled_fisher_product(networks: ActorCritic, obs: Tensor, latent: Tensor) -
     Returns:
         The product, for v `[S, P]` in the order of `actor.theta`.
 
-    Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
-        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
-        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
-        >>> product = sampled_fisher_product(networks, obs=torch.ones(2, 64, 3), latent=torch.ones(2, 64, 1))
-        >>> v = torch.ones_like(networks.actor.theta)
-        >>> bool((dot(v, product(v)) > 0).all())
-        True
+    (`kl_hessian_product`, whose product is used alike, has an example.)
     """
     weights = networks.actor.parameters
     log_prob = networks.policy.law.log_prob(networks.parameters(obs), latent)
@@ -218,17 +211,7 @@ def surrogate(
         advantage: `[S, T]`.
         entropy_coef: c_H, per nat.
 
-    Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
-        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
-        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
-        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
-        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
-        >>> advantage = torch.ones(2, 64)
-        >>> steps = Minibatch(obs, latent, log_prob, advantage, return_=advantage)
-        >>> objective, _ = surrogate(networks, steps, advantage, entropy_coef=0.0)
-        >>> objective.tolist()  # all ratios are 1 at the policies that drew it
-        [1.0, 1.0]
+    (`natural_step` has an example.)
     """
     policy = networks.policy
     parameters = networks.parameters(steps.obs)
@@ -240,7 +223,7 @@ def surrogate(
 
 
 class LineSearch(NamedTuple):
-    """What became of each seed's step, `[S]` each; `line_search`, which makes it, has an example."""
+    """What became of each seed's step, `[S]` each. `natural_step` has an example."""
 
     accepted: Tensor
     """Booleans: some length satisfied both conditions."""
@@ -250,11 +233,7 @@ class LineSearch(NamedTuple):
 
 @torch.no_grad()
 def line_search(
-    networks: ActorCritic,
-    steps: Rollout | Minibatch,
-    advantage: Tensor,
-    step: Tensor,
-    config: TRPOConfig,
+    networks: ActorCritic, steps: Rollout | Minibatch, advantage: Tensor, step: Tensor, config: TRPOConfig
 ) -> LineSearch:
     """Move each policy along its step, as far as the exact KL divergence and the surrogate allow.
 
@@ -270,17 +249,7 @@ def line_search(
     Returns:
         The outcome.
 
-    Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
-        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
-        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
-        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
-        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
-        >>> advantage, config = latent[..., 0], TRPOConfig()  # the larger the latent, the better
-        >>> steps = Minibatch(obs, latent, log_prob, advantage, return_=advantage)
-        >>> step = natural_step(networks, steps, advantage, config)
-        >>> line_search(networks, steps, advantage, step, config).accepted
-        tensor([True, True])
+    (`natural_step` has an example.)
     """
     theta, law = networks.actor.theta, networks.policy.law
     start = theta.clone()
@@ -321,10 +290,14 @@ def natural_step(
         >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
         >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
         >>> steps = Minibatch(obs, latent, log_prob, advantage=latent[..., 0], return_=log_prob)
+        >>> surrogate(networks, steps, torch.ones(2, 64), entropy_coef=0.0)[0].tolist()  # before the step ratios are 1
+        [1.0, 1.0]
         >>> step = natural_step(networks, steps, steps.advantage, TRPOConfig(entropy_coef=0.0))
         >>> product = damped(kl_hessian_product(networks, obs), damping=0.1)
         >>> (dot(step, product(step)) / 2).flatten().numpy().round(4)  # as long as δ allows: ½ xᵀFx = 0.01
         array([0.01, 0.01], dtype=float32)
+        >>> line_search(networks, steps, steps.advantage, step, TRPOConfig()).accepted
+        tensor([True, True])
     """
     objective, _ = surrogate(networks, steps, advantage, config.entropy_coef)
     gradient = flatten(torch.autograd.grad(objective.sum(), networks.actor.parameters))
