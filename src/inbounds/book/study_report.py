@@ -163,8 +163,17 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
         outcome = outcomes.finished.get(cell.id)
         found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
         panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
-        names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
-        rows.append([spoken(estimate) for estimate in found.values()])
+        if found["final"] is not None:
+            names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
+            rows.append([spoken(estimate) for estimate in found.values()])
+    counts = {
+        panel.replace("\n", ", "): (sum(e is not None for e in row.values()), len(row))
+        for panel, row in panels.items()
+    }
+    unfinished = any(done < planned for done, planned in counts.values())
+    panels = {panel: row for panel, row in panels.items() if any(row.values())}
+    if not panels:
+        return [NONE_FINISHED]
     fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
@@ -172,13 +181,14 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
     )
     # What all rows share is said once, in the caption: the table is wide enough.
     columns = dict(zip(("robot", "algorithm", "family", "variant"), zip(*names, strict=True), strict=True))
-    shared = [column[0] for column in columns.values() if len(set(column)) == 1]
-    told = {name: column for name, column in columns.items() if len(set(column)) > 1}
+    told = {name: column for name, column in columns.items() if len(set(column)) > 1 or len(rows) == 1}
+    shared = [column[0] for name, column in columns.items() if name not in told]
     where = f"{title} ({', '.join(shared)})" if shared else title
-    caption = f"{where}: changed cell minus cell of comparison; missing where either is not finished."
+    caption = f"{where}: changed cell minus cell of comparison."
     table = [[*name, *row] for name, row in zip(zip(*told.values(), strict=True), rows, strict=True)]
     head = [*told, *HEADS.values()]
-    return [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
+    parts = [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
+    return parts + ([html.progress(counts)] if unfinished else [])
 
 
 def _panel(cell: Cell) -> str:
