@@ -8,7 +8,7 @@ It works with no cell, with a few and with all of them: what is missing is calle
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from inbounds.book import report_page as html
@@ -166,14 +166,15 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
         if found["final"] is not None:
             names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
             rows.append([spoken(estimate) for estimate in found.values()])
-    counts = {
-        panel.replace("\n", ", "): (sum(e is not None for e in row.values()), len(row))
-        for panel, row in panels.items()
-    }
-    unfinished = any(done < planned for done, planned in counts.values())
-    panels = {panel: row for panel, row in panels.items() if any(row.values())}
-    if not panels:
+    if not rows:
         return [NONE_FINISHED]
+    counts = {panel: (sum(map(bool, row.values())), len(row)) for panel, row in panels.items()}
+    drawn = {family for row in panels.values() for family, estimate in row.items() if estimate}
+    panels = {
+        panel: {family: estimate for family, estimate in row.items() if family in drawn}
+        for panel, row in panels.items()
+        if any(row.values())
+    }
     fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
@@ -188,7 +189,18 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
     table = [[*name, *row] for name, row in zip(zip(*told.values(), strict=True), rows, strict=True)]
     head = [*told, *HEADS.values()]
     parts = [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
-    return parts + ([html.progress(counts)] if unfinished else [])
+    if any(done < planned for done, planned in counts.values()):
+        parts.append(html.progress(_without_shared(counts)))
+    return parts
+
+
+def _without_shared(counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    """Name panels in one line, by what does not hold for all of them."""
+    names = [panel.replace("\n", ", ").split(", ") for panel in counts]
+    told = [i for i, part in enumerate(zip(*names, strict=True)) if len(set(part)) > 1] or [0]
+    return {
+        ", ".join(name[i] for i in told): count for name, count in zip(names, counts.values(), strict=True)
+    }
 
 
 def _panel(cell: Cell) -> str:
