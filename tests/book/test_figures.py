@@ -55,6 +55,14 @@ def test_colours_differ_in_greyscale_and_stand_out(palette: str) -> None:
         assert contrast(color, background) > 2.95, name
 
 
+@pytest.mark.parametrize("vision", VISION)
+def test_no_other_curve_looks_like_a_family(vision: str) -> None:
+    """Shades may be as light as a family is, so their colours must differ the more."""
+    for shade, look in itertools.product(figures.SHADES, figures.FAMILIES.values()):
+        seen = [cie_lab(VISION[vision] @ linear_rgb(color)) for color in (shade, look.color)]
+        assert np.linalg.norm(seen[0] - seen[1]) > 20, (shade, look.label)
+
+
 def test_families_differ_in_line_and_marker_too() -> None:
     looks = figures.FAMILIES.values()
     assert (

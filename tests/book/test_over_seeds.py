@@ -6,9 +6,10 @@ import pytest
 from scipy import stats
 
 from inbounds.book import figures
-from inbounds.book.over_seeds import draw, final_policies, mean_of, minus
+from inbounds.book.over_seeds import MANY, draw, final_policies, mean_of, minus
 from inbounds.study import grid
 from inbounds.study.outcomes import Outcomes
+from inbounds.study.statistics import difference
 from inbounds.study.store import StudyFolder
 
 
@@ -29,6 +30,18 @@ def test_a_difference_has_about_welchs_interval() -> None:
     assert (found.low, found.high) == pytest.approx((welch.low, welch.high), rel=0.05)
     turned = minus(second, first)
     assert turned.value == pytest.approx(-found.value)
+
+
+def test_many_resamples_settle_on_which_side_of_zero_an_interval_ends() -> None:
+    """With another seed of the resampling the end hardly moves; and the interval is the package's."""
+    rng = np.random.default_rng(3)
+    first, second = rng.normal(5.0, 2.0, 10), rng.normal(3.0, 1.0, 10)
+    found = minus(first, second, resamples=MANY)
+    again = difference(first, second, np.random.default_rng(1), statistic="mean", resamples=MANY)
+    assert MANY >= 100_000
+    assert found == difference(first, second, np.random.default_rng(0), statistic="mean", resamples=MANY)
+    assert found.low != minus(first, second).low
+    assert abs(found.low - again.low) < 0.02 * (found.high - found.low)
 
 
 def test_a_curve_is_drawn_where_the_study_measures() -> None:

@@ -86,9 +86,37 @@ def test_the_page_shows_it_quietly():
     assert not re.search(r"https?://", text)
 
 
-def test_the_poster_is_the_first_frame():
+def test_the_poster_of_a_film_by_itself_is_the_first_frame():
     (video,) = videos.show_films({"One": film()})
     assert mediapy.decompress_image(video.poster).mean() == pytest.approx(200, abs=4)
+
+
+def test_posters_of_a_comparison_show_where_all_films_differ():
+    """Frame 10: one of three differs a lot; frame 15: all differ, by less. The shortest film ends at 20."""
+    films = [film(seconds=seconds) for seconds in (1.0, 0.8, 1.0)]
+    films[2].frames[10] = 250
+    for each, brightness in zip(films, (90, 120, 150), strict=True):
+        each.frames[15] = brightness
+    films[0].frames[22], films[2].frames[22] = 0, 255  # nothing to compare with any more
+    assert videos.most_telling(films) == pytest.approx(15 / 25)
+    row = videos.show_films(dict(zip("ABC", films, strict=True)))
+    shown = [mediapy.decompress_image(video.poster).mean() for video in row]
+    assert shown == pytest.approx([90, 120, 150], abs=4)
+
+
+def test_moments_are_compared_in_seconds():
+    """The same second is frame 5 of the one and frame 10 of the other."""
+    slow, fast = film(fps=10.0), film(fps=20.0)
+    slow.frames[5], fast.frames[5] = 255, 255
+    slow.frames[7], fast.frames[14] = 255, 255
+    slow.frames[0] = fast.frames[0] = 60
+    assert videos.most_telling([slow, fast]) == pytest.approx(0.5)
+
+
+def test_films_of_two_sizes_open_with_their_first_frames():
+    films = {"One": film(), "Other": film(shape=(64, 64))}
+    for video in videos.show_films(films):
+        assert mediapy.decompress_image(video.poster).mean() == pytest.approx(200, abs=4)
 
 
 def test_a_film_hard_to_compress_is_encoded_more_coarsely():

@@ -1,10 +1,12 @@
 """Videos in the built book play when the reader asks, and end."""
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext
+from PIL import Image
+from playwright.sync_api import Browser, BrowserContext, Locator
 
 from inbounds.book import videos
 from inbounds.robots import Film
@@ -64,3 +66,38 @@ def test_two_films_fit_a_phone_and_play_to_their_end(browser: Browser, tmp_path:
         page.evaluate("document.querySelector('video').play()")
         page.wait_for_function("document.querySelector('video').ended", timeout=10_000)
         page.close()
+
+
+def test_controls_do_not_cover_the_picture(browser: Browser, tmp_path: Path) -> None:
+    """Before it is played and when it is paused again, with and without scripts, its lower third is free."""
+    film = Film(np.full((50, 240, 320, 3), (40, 160, 90), np.uint8), 25.0, 0.0)
+    row = videos.show_films({"One": film, "Two": film})
+    (tmp_path / "index.html").write_text(f"<!doctype html><body>{row._repr_html_()}", encoding="utf8")
+
+    def worst_and_band(video: Locator) -> tuple[int, int]:
+        """How far the lower third is from the film's colour, and the brightest of what is below the picture."""
+        for _ in range(100):  # while it loads, Chromium draws a ring on the poster
+            pixels = np.asarray(Image.open(io.BytesIO(video.screenshot())).convert("RGB")).astype(int)
+            worst = int(np.abs(pixels[160:232, 4:-4] - (40, 160, 90)).max())
+            if worst < 30:
+                break
+            video.page.wait_for_timeout(100)
+        return worst, int(pixels[240:].max())
+
+    with book.served(tmp_path) as address:
+        for scripts in (True, False):
+            context = browser.new_context(java_script_enabled=scripts)
+            page = context.new_page()
+            page.goto(address + "index.html")
+            video = page.locator("video").first
+            worst, band = worst_and_band(video)
+            assert worst < 30
+            assert band > 200, "no controls in the band"
+            if scripts:
+                video.evaluate("node => node.play()")
+                page.wait_for_function("document.querySelector('video').currentTime > 0.2")
+                video.evaluate("node => node.pause()")
+                assert worst_and_band(video)[0] < 30
+            page.keyboard.press("Tab")
+            assert video.evaluate("node => node === document.activeElement"), "a keyboard does not reach it"
+            context.close()

@@ -92,8 +92,11 @@ FAMILIES: Mapping[str, FamilyStyle] = MappingProxyType(
 )
 """The four policy families, in the order in which the book compares them."""
 
-SHADES = ("#12264F", "#6A3D8F", "#C1477C", "#DB7A33")
-"""Four colours for curves that are not families, dark to light; each comes with its own line style."""
+SHADES = ("#541B2E", "#4A36D8", "#A92DB0", "#B37FC8")
+"""Four colours for curves that are not families, dark to light; each comes with its own line style.
+
+None can be taken for a family's colour, with any kind of colour vision.
+"""
 
 STYLE: Mapping[str, Any] = MappingProxyType(
     {

@@ -16,12 +16,16 @@ from numpy.typing import ArrayLike
 
 from inbounds.book import figures
 from inbounds.learning import TrainedPolicy, load_policy
-from inbounds.study.ledger.evidence import combination
 from inbounds.study.outcomes import Outcome, Outcomes
-from inbounds.study.statistics import Estimate, bootstrap
+from inbounds.study.statistics import Estimate, bootstrap, difference
+from inbounds.study.statistics.settings import RESAMPLES
 
 BAND_RESAMPLES = 1000
 """Of a curve's band, which nobody reads to the last digit."""
+
+MANY = 100_000
+"""Resamples for an interval that ends near zero: with the protocol's number, zero may lie inside for one seed of the
+resampling and outside for the next."""
 
 
 def mean_of(values: ArrayLike) -> Estimate:
@@ -34,15 +38,20 @@ def mean_of(values: ArrayLike) -> Estimate:
     return bootstrap(np.asarray(values, np.float64), np.random.default_rng(0), statistic="mean")
 
 
-def minus(first: ArrayLike, second: ArrayLike) -> Estimate:
+def minus(first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
     """Return the difference of the means of two independent groups of seeds, with its interval.
+
+    Args:
+        first: `[S]`.
+        second: `[S']`.
+        resamples: of each group; `MANY` where an interval ends near zero.
 
     Example:
         >>> minus([2.0, 3.0, 4.0], [1.0, 1.0, 4.0]).value.item()
         1.0
     """
-    groups = [np.asarray(each, np.float64) for each in (first, second)]
-    return combination(groups, [1, -1], np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    return difference(first, second, rng, statistic="mean", resamples=resamples, missing="exclude")
 
 
 def draw(ax: Any, family: str, values: ArrayLike, x: ArrayLike | None = None, **changed: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -82,8 +82,22 @@ def any_finished(cells: Cells) -> bool:
     return any(outcome for row in cells.values() for outcome in row.values())
 
 
+def begun(cells: Cells) -> Cells:
+    """Return the robots of which at least one cell is finished."""
+    return {robot: row for robot, row in cells.items() if any(row.values())}
+
+
+def lacking(robots: Iterable[str]) -> str:
+    """Name the robots that have no row, as a sentence of a caption; nothing where none lacks."""
+    left = [robot for robot in ROBOTS if robot not in set(robots)]
+    return f" Not finished: {', '.join(left)}." if left else ""
+
+
 def curves(title: str, cells: Cells) -> list[str]:
-    """Return the learning curves, a panel per robot."""
+    """Return the learning curves, a panel per robot, and how many cells are finished where some are not."""
+    counts = {robot: (sum(o is not None for o in row.values()), len(row)) for robot, row in cells.items()}
+    unfinished = any(done < planned for done, planned in counts.values())
+    cells = begun(cells)
 
     def drawn(outcome: Outcome | None) -> Curve | None:
         band = analysis.curve(outcome) if outcome else None
@@ -99,7 +113,7 @@ def curves(title: str, cells: Cells) -> list[str]:
         "Mean undiscounted return of the episodes that ended in an epoch, over seeds; the axis counts the env steps "
         "of one seed, of which ten train. Each robot has its own scale."
     )
-    return [html.figure(fig, alt, caption)]
+    return [html.figure(fig, alt, caption), *([html.progress(counts)] if unfinished else [])]
 
 
 def _final(outcome: Outcome | None) -> Estimate | None:
@@ -108,6 +122,7 @@ def _final(outcome: Outcome | None) -> Estimate | None:
 
 def endpoints(title: str, cells: Cells) -> list[str]:
     """Return the final returns as a figure, and all endpoints as a table."""
+    cells = begun(cells)
     finals = {robot: {f: _final(o) for f, o in row.items()} for robot, row in cells.items()}
     fig = interval_panels(
         finals, xlabel="final return: mean of training returns over the last 10 % of epochs"
@@ -123,7 +138,7 @@ def endpoints(title: str, cells: Cells) -> list[str]:
             numbers = [spoken(analysis.estimate(outcome, e, s)) for e in ENDPOINTS for s in ("mean", "iqm")]
             counts = [str(len(outcome.diverged)), str(int(outcome.diverged.sum()))]
             rows.append([robot, FAMILIES[family].label, *counts, *numbers])
-    caption = f"Endpoints ({title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval."
+    caption = f"Endpoints ({title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval.{lacking(cells)}"
     alt = f"Final returns ({title}) with intervals, a panel per robot: {in_words(finals)}"
     return [html.figure(fig, alt, ""), html.table(caption, head, rows, words=(0, 1))]
 
@@ -138,10 +153,13 @@ def differences(outcomes: Outcomes, arm: str, algorithm: str, *, without_diverge
         }
         for endpoint in ENDPOINTS
     }
+    known = [robot for robot in ROBOTS if any(found["final"][c][robot].difference for c in contrasts)]
+    if not known:
+        return [html.paragraph("missing: of no robot are two cells to be compared finished.", "missing")]
     rows = [
         [robot, pair_name(c), *_row([found[endpoint][c][robot] for endpoint in ENDPOINTS])]
         for c in contrasts
-        for robot in ROBOTS
+        for robot in known
     ]
     head = ["robot", "difference"]
     head += [word for name in HEADS.values() for word in (name, "p, Holm", "")]
@@ -149,16 +167,16 @@ def differences(outcomes: Outcomes, arm: str, algorithm: str, *, without_diverge
     caption = (
         f"Differences of means ({title_of(arm, algorithm)}{which}): in brackets "
         f"a {percent(LEVEL)} bootstrap interval; p of a permutation test, corrected over the six robots (Holm). "
-        "Unresolved: the interval contains 0, which is no evidence of equality."
+        f"Unresolved: the interval contains 0, which is no evidence of equality.{lacking(known)}"
     )
     told = html.table(caption, head, rows, words=(0, 1, 4, 7, 10))
     if without_diverged:
         return [told]
-    finals = {robot: {(c.first, c.second): found["final"][c][robot] for c in contrasts} for robot in ROBOTS}
+    finals = {robot: {(c.first, c.second): found["final"][c][robot] for c in contrasts} for robot in known}
     alt = f"Differences of mean final returns ({title_of(arm, algorithm)}), a panel per robot: " + ". ".join(
         f"{pair_name(c)} on {robot}: {_row([found['final'][c][robot]])[0]}"
         for c in contrasts
-        for robot in ROBOTS
+        for robot in known
     )
     return [html.figure(difference_panels(finals, xlabel="difference of mean final returns"), alt, ""), told]
 

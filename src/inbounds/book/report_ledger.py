@@ -48,7 +48,7 @@ def counted(found: Sequence[Finding]) -> str:
     told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in ("supported", "refuted", "undecided"))
     stay = sum(each.outlook == STAYS for each in found)
     rest = f", of which {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives" if stay else ""
-    return f"{len(found)} claims: {told}{rest}."
+    return f"{len(found)} claim{'' if len(found) == 1 else 's'}: {told}{rest}."
 
 
 def decided(found: Sequence[Finding]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from matplotlib.figure import Figure
@@ -81,6 +81,27 @@ def paragraph(text: str, kind: str = "") -> str:
 def bullets(items: Iterable[str]) -> str:
     """Return a list of plain texts."""
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
+
+
+_PART = (
+    "flex:1 1 auto;padding:.1rem .6rem;border:1px solid #5f6770;border-radius:3px;text-align:center;margin:0;"
+    "background:linear-gradient(90deg,rgba(31,130,119,.3) {share:.0%},transparent {share:.0%})"
+)
+
+
+def progress(parts: Mapping[str, tuple[int, int]]) -> str:
+    """Return one strip that says of each part how many of its cells are finished, of how many.
+
+    Example:
+        >>> "Hopper: 2 of 3" in progress({"Hopper": (2, 3)})
+        True
+    """
+    told = "".join(
+        f'<li style="{_PART.format(share=done / planned)}">{escape(name)}: {done} of {planned}</li>'
+        for name, (done, planned) in parts.items()
+    )
+    look = "display:flex;flex-wrap:wrap;gap:.3rem;list-style:none;padding:0;margin:1rem 0;max-width:none"
+    return f'<p>Finished:</p><ul style="{look}">{told}</ul>'
 
 
 def figure(fig: Figure, alt: str, caption: str = "") -> str:

@@ -30,14 +30,16 @@ _WORDS = ("higher", "lower", "not after Holm", "unresolved", "missing")
 
 def score_sheet(outcomes: Outcomes) -> list[str]:
     """Return on how many robots each difference of mean final returns goes which way, beside what the thesis says."""
-    rows = []
+    rows: list[list[str]] = []
+    waiting: list[str] = []
     for contrast in CONTRASTS:
         found = Counter(
             verdict(row) or "missing" for row in analysis.differences(outcomes, contrast, "final").values()
         )
-        counts = [str(found[word]) for word in _WORDS]
         if found["missing"] == len(ROBOTS):  # noughts would read as a result
-            counts[:-1] = ["missing", *["–"] * (len(_WORDS) - 2)]
+            waiting.append(f"{title_of(contrast.arm, contrast.algorithm)}, {pair_name(contrast)}")
+            continue
+        counts = [str(found[word]) for word in _WORDS]
         said = "" if contrast.arm == "beyond" else THESIS[contrast.algorithm, contrast.first, contrast.second]
         rows.append(
             [
@@ -53,7 +55,11 @@ def score_sheet(outcomes: Outcomes) -> list[str]:
         "Holm's correction; not after Holm: the interval leaves out 0, the corrected test does not; "
         "unresolved: the interval contains 0."
     )
-    return [html.table(caption, ["columns", "difference", *_WORDS, "the source thesis"], rows, (0, 1, 7))]
+    head = ["columns", "difference", *_WORDS, "the source thesis"]
+    parts = [html.table(caption, head, rows, (0, 1, 7))] if rows else []
+    if waiting:
+        parts.append(html.paragraph(f"missing on all robots: {'; '.join(waiting)}.", "missing"))
+    return parts
 
 
 def found_differences(outcomes: Outcomes, arm: str) -> list[str]:

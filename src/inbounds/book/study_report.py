@@ -8,7 +8,7 @@ It works with no cell, with a few and with all of them: what is missing is calle
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from inbounds.book import report_page as html
@@ -163,8 +163,18 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
         outcome = outcomes.finished.get(cell.id)
         found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
         panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
-        names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
-        rows.append([spoken(estimate) for estimate in found.values()])
+        if found["final"] is not None:
+            names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
+            rows.append([spoken(estimate) for estimate in found.values()])
+    if not rows:
+        return [NONE_FINISHED]
+    counts = {panel: (sum(map(bool, row.values())), len(row)) for panel, row in panels.items()}
+    drawn = {family for row in panels.values() for family, estimate in row.items() if estimate}
+    panels = {
+        panel: {family: estimate for family, estimate in row.items() if family in drawn}
+        for panel, row in panels.items()
+        if any(row.values())
+    }
     fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
@@ -172,13 +182,25 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
     )
     # What all rows share is said once, in the caption: the table is wide enough.
     columns = dict(zip(("robot", "algorithm", "family", "variant"), zip(*names, strict=True), strict=True))
-    shared = [column[0] for column in columns.values() if len(set(column)) == 1]
-    told = {name: column for name, column in columns.items() if len(set(column)) > 1}
+    told = {name: column for name, column in columns.items() if len(set(column)) > 1 or len(rows) == 1}
+    shared = [column[0] for name, column in columns.items() if name not in told]
     where = f"{title} ({', '.join(shared)})" if shared else title
-    caption = f"{where}: changed cell minus cell of comparison; missing where either is not finished."
+    caption = f"{where}: changed cell minus cell of comparison."
     table = [[*name, *row] for name, row in zip(zip(*told.values(), strict=True), rows, strict=True)]
     head = [*told, *HEADS.values()]
-    return [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
+    parts = [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
+    if any(done < planned for done, planned in counts.values()):
+        parts.append(html.progress(_without_shared(counts)))
+    return parts
+
+
+def _without_shared(counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    """Name panels in one line, by what does not hold for all of them."""
+    names = [panel.replace("\n", ", ").split(", ") for panel in counts]
+    told = [i for i, part in enumerate(zip(*names, strict=True)) if len(set(part)) > 1] or [0]
+    return {
+        ", ".join(name[i] for i in told): count for name, count in zip(names, counts.values(), strict=True)
+    }
 
 
 def _panel(cell: Cell) -> str:

@@ -3,12 +3,16 @@
 A video is an MP4 (H.264, 4:2:0, the one format that every browser plays), carried in the page itself, so that the
 built book needs no other file. It starts when the reader asks, ends after at most five seconds and weighs at
 most 120 kB. The encoder is the ffmpeg that the package ``imageio-ffmpeg`` brings along.
+
+The browser's own controls stand in a band below the picture, not on it: they need no script, and a keyboard reaches
+them. Films that are shown together open with the moment in which they differ most.
 """
 
 import base64
 import html
+import itertools
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +31,10 @@ _FILE_QUANTISER = 22  # for files, which are watched larger
 # the index stands at the front, so that the duration is known before the video is played.
 _FFMPEG_ARGS = ("-bf", "0", "-movflags", "+faststart", "-map_metadata", "-1", "-fflags", "+bitexact")
 
+_BAND = 60  # pixels below the picture: Chromium's controls take 56, Firefox's 40
+# Chromium darkens what is behind its controls, and some way above them; the band is dark as it is.
+_STYLE = "<style>.inbounds-videos video::-webkit-media-controls-panel{background-image:none}</style>"
+
 
 @dataclass(frozen=True)
 class Video:
@@ -35,7 +43,7 @@ class Video:
     Attributes:
         title: the caption.
         mp4: the file's bytes.
-        poster: JPEG of the first frame, shown until the video is played.
+        poster: JPEG of one frame, shown until the video is played.
         width: in pixels.
         height: in pixels.
         seconds: duration.
@@ -54,11 +62,14 @@ class Video:
         """A figure with the video and its caption."""
         title = html.escape(self.title, quote=True)
         label = f"Video, {self.seconds:.1f} seconds: {title}"
+        # The picture is as wide as the figure; a browser without container units scales the band with it.
+        picture = f"{100 * self.height / self.width:.4g}cqw"
         return (
-            f'<figure style="margin:0;flex:1 1 14rem;min-width:0;max-width:{self.width}px">'
+            f'<figure style="margin:0;flex:1 1 14rem;min-width:0;max-width:{self.width}px;container-type:inline-size">'
             f'<video controls muted playsinline preload="metadata" aria-label="{label}" '
             f'poster="data:image/jpeg;base64,{_base64(self.poster)}" '
-            f'style="display:block;width:100%;height:auto;aspect-ratio:{self.width}/{self.height}">'
+            f'style="display:block;width:100%;aspect-ratio:{self.width}/{self.height + _BAND};height:auto;'
+            f'height:calc({picture} + {_BAND}px);object-fit:contain;object-position:top;background:#22272D">'
             f'<source type="video/mp4" src="data:video/mp4;base64,{_base64(self.mp4)}">'
             f"{label} (this browser cannot play it)</video>"
             f'<figcaption style="text-align:center;margin-top:0.25rem">{title}</figcaption></figure>'
@@ -88,12 +99,15 @@ class VideoRow:
         figures = "".join(video.to_html() for video in self.videos)
         return (
             '<div class="inbounds-videos" style="display:flex;flex-wrap:wrap;gap:1rem;justify-content:center">'
-            f"{figures}</div>"
+            f"{_STYLE}{figures}</div>"
         )
 
 
 def show_films(films: Mapping[str, Film]) -> VideoRow:
     """Encode films for a page, side by side under their captions.
+
+    Before they are played, all show the same moment: the one in which the two films that are most alike differ most.
+    A film by itself shows its first frame.
 
     Args:
         films: caption → film, each of at most five seconds and of even width and height.
@@ -113,7 +127,35 @@ def show_films(films: Mapping[str, Film]) -> VideoRow:
     """
     if not films:
         raise ValueError("There is no film to show: pass a mapping from captions to films.")
-    return VideoRow([_encode_for_page(title, film) for title, film in films.items()])
+    moment = most_telling(list(films.values()))
+    return VideoRow([_encode_for_page(title, film, moment) for title, film in films.items()])
+
+
+def most_telling(films: Sequence[Film]) -> float:
+    """Return the moment, in seconds, in which the two films that are most alike differ most.
+
+    Args:
+        films: that are to be compared; where there is one, or their sizes differ, the moment is the first frame's.
+
+    Example:
+        >>> from inbounds.robots import Film
+        >>> frames = np.zeros((2, 10, 32, 32, 3), np.uint8)
+        >>> frames[1, 4] = 255
+        >>> most_telling([Film(each, fps=20, total_reward=0.0) for each in frames])
+        0.2
+    """
+    if len(films) < 2 or len({film.frames.shape[1:] for film in films}) > 1:
+        return 0.0
+    seconds = min(len(film.frames) / film.fps for film in films)
+    fps = min(film.fps for film in films)
+    moments = np.arange(int(seconds * fps)) / fps
+
+    def apart(moment: float) -> float:
+        # Every fourth pixel will do, and saves most of the time.
+        seen = [film.frames[round(moment * film.fps), ::4, ::4].astype(np.int16) for film in films]
+        return float(min(np.abs(a - b).mean() for a, b in itertools.combinations(seen, 2)))
+
+    return float(max(moments, key=apart))
 
 
 def write_film(path: str | os.PathLike[str], film: Film) -> Path:
@@ -143,7 +185,7 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
     return path
 
 
-def _encode_for_page(title: str, film: Film) -> Video:
+def _encode_for_page(title: str, film: Film, moment: float) -> Video:
     num_frames, height, width = film.frames.shape[:3]
     seconds = num_frames / film.fps
     if seconds > MAX_SECONDS:
@@ -153,7 +195,8 @@ def _encode_for_page(title: str, film: Film) -> Video:
     for quantiser in _PAGE_QUANTISERS:
         mp4 = _encode(film, quantiser)
         if len(mp4) <= MAX_BYTES:
-            return Video(title, mp4, _poster(film.frames[0]), width, height, seconds)
+            poster = _poster(film.frames[round(moment * film.fps)])
+            return Video(title, mp4, poster, width, height, seconds)
     raise ValueError(
         f"{title!r} takes {len(mp4) / 1000:.0f} kB, a page allows {MAX_BYTES / 1000:.0f} kB: "
         "record fewer seconds or smaller frames."
