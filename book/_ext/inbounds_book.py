@@ -5,6 +5,7 @@
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
+* Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
@@ -51,6 +52,20 @@ def choose_scripts(
         for script in explorables.javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
+
+
+MENDED = {
+    ' role="doc-biblioentry"': ' role="listitem"',  # deprecated by ARIA, and no child for the list around it
+    ' aria-label="Toggle hidden content"': "",  # on a summary that says "Show code cell source"
+}
+
+
+def mend_labels(
+    app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Say to assistive technology what the page says to the eye."""
+    for written, right in MENDED.items():
+        context["body"] = context.get("body", "").replace(written, right)
 
 
 SHIELDED: dict[str, list[str]] = {}
@@ -135,6 +150,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers (called by Sphinx)."""
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
+    app.connect("html-page-context", mend_labels)
     app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500
     app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("missing-reference", resolve_public_name)

@@ -2,11 +2,12 @@
 
 import importlib.util
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 from docutils import nodes
 from docutils.utils import new_document
+from PIL import Image
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +48,48 @@ def test_only_glued_text_is_touched(extension: ModuleType) -> None:
     document += nodes.paragraph("", "", glued, typed)
     extension.set_numbers(None, document, "page")
     assert document.astext() == "−1\N{NARROW NO-BREAK SPACE}000-1,000"
+
+
+@pytest.fixture(scope="module")
+def metadata() -> ModuleType:
+    path = Path(__file__).parents[2] / "book" / "_ext" / "metadata.py"
+    spec = importlib.util.spec_from_file_location("metadata", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_descriptions_are_cut_behind_a_word(metadata: ModuleType) -> None:
+    assert metadata.shorten("two\n words") == "two words"
+    cut = metadata.shorten("word, " * 60)
+    assert len(cut) <= metadata.LONGEST
+    assert cut.endswith("word…")
+
+
+def test_a_page_is_described_by_words_without_formulas(metadata: ModuleType) -> None:
+    document = new_document("page")
+    section = nodes.section()
+    section += nodes.paragraph("", "Where ", nodes.math("", r"\gamma"), nodes.Text(" is small."))
+    section += nodes.paragraph("", "What is a bound?")
+    document += section
+    assert metadata.first_words(document) == "What is a bound?"
+    assert metadata.first_words(None) == ""
+
+
+@pytest.mark.parametrize("site", ["", "https://someone.example/in-bounds/"])
+def test_a_picture_needs_the_address_of_the_site(metadata: ModuleType, site: str) -> None:
+    config = SimpleNamespace(html_title="In Bounds", html_baseurl=site)
+    written = metadata.tags(config, "A <title>", "What?", f"{site}a.html" if site else "")
+    assert 'property="og:title" content="A &lt;title&gt;"' in written
+    assert ("https://someone.example/in-bounds/_static/social.png" in written) is bool(site)
+    assert ('property="og:url"' in written) is bool(site)
+
+
+def test_the_picture_is_as_its_tags_say(metadata: ModuleType) -> None:
+    path = Path(__file__).parents[2] / "book" / "_static" / metadata.PICTURE
+    assert path.stat().st_size < 60_000
+    with Image.open(path) as picture:
+        assert picture.size == metadata.PICTURE_SIZE
+        assert picture.format == "PNG"

@@ -11,6 +11,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
@@ -60,12 +61,28 @@ def pages(containing: str = "") -> list[str]:
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
-    """Serves files without a line on stderr for each; whole files, so that a keep-alive connection is safe."""
+    """Serves files without a line on stderr for each; whole files, so that a keep-alive connection is safe.
+
+    What is not there is answered by the book's own 404.html, as the usual hosts of static pages do.
+    """
 
     protocol_version = "HTTP/1.1"
 
     def log_message(self, format: str, *args: Any) -> None:
         pass
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        page = Path(self.directory, "404.html")
+        if code != HTTPStatus.NOT_FOUND or not page.exists():
+            super().send_error(code, message, explain)
+            return
+        content = page.read_bytes()
+        self.send_response(code)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
 
 
 @contextmanager
@@ -86,10 +103,12 @@ def served(folder: Path) -> Iterator[str]:
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """A headless Chromium."""
+    """A headless Chromium that shows scrollbars, as a desktop does; Playwright hides them unless told."""
     path = find_chromium()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGUMENTS)
+        browser = playwright.chromium.launch(
+            executable_path=path, headless=True, args=ARGUMENTS, ignore_default_args=["--hide-scrollbars"]
+        )
         try:
             yield browser
         finally:

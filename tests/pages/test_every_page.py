@@ -93,6 +93,79 @@ def test_mathematics_is_typeset(visit: Visit) -> None:
     assert visit.page.eval_on_selector_all("article .math", raw) == []
 
 
+def test_scrollbars_are_shown(visit: Visit) -> None:
+    """Else nobody would see those of the next test."""
+    width = """() => {
+      const box = document.body.appendChild(document.createElement('div'));
+      box.style.cssText = 'width: 100px; height: 100px; overflow: scroll';
+      const width = box.offsetWidth - box.clientWidth;
+      box.remove();
+      return width;
+    }"""
+    assert visit.page.evaluate(width) > 5
+
+
+def test_no_formula_in_a_line_of_text_scrolls(visit: Visit) -> None:
+    scrolling = """nodes => nodes.filter((formula) => [formula, ...formula.querySelectorAll('*')].some((node) => {
+      const { overflowX, overflowY } = getComputedStyle(node);
+      return (/auto|scroll/.test(overflowX) && node.scrollWidth > node.clientWidth)
+          || (/auto|scroll/.test(overflowY) && node.scrollHeight > node.clientHeight);
+    })).map((formula) => formula.textContent)"""
+    assert visit.page.eval_on_selector_all("article span.math", scrolling) == []
+
+
+@pytest.mark.parametrize("width", ["desktop", "phone"])
+def test_formulas_in_text_are_not_cut_off(visit: Visit, width: str) -> None:
+    """Nothing but the page's own column bounds them, and they fit in it."""
+    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
+    visit.page.evaluate(book.AT_REST)
+    cut = """nodes => nodes.filter((formula) => {
+      let column = formula.parentElement;
+      while (getComputedStyle(column).display.startsWith('inline')) column = column.parentElement;
+      const scrolls = (node) =>
+        node && (/auto|scroll/.test(getComputedStyle(node).overflowX) || scrolls(node.parentElement));
+      return getComputedStyle(formula).overflowX !== 'visible' || (!scrolls(column.closest('article *'))
+        && [...formula.getClientRects()].some((box) => box.right > column.getBoundingClientRect().right + 2));
+    }).map((formula) => formula.textContent)"""
+    assert visit.page.eval_on_selector_all("article span.math", cut) == []
+
+
+@pytest.mark.parametrize("width", ["desktop", "phone"])
+def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit, width: str) -> None:
+    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
+    visit.page.evaluate(book.AT_REST)
+    unnamed = """nodes => nodes.filter((node) => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1
+        && /auto|scroll/.test(getComputedStyle(node).overflowX))
+      .filter((node) => node.tabIndex !== 0 || !(node.caption?.textContent ?? node.ariaLabel)?.trim())
+      .map((node) => node.outerHTML.slice(0, 120))"""
+    tables = "article table:not(.inbounds-explorable table), article mjx-container"
+    assert visit.page.eval_on_selector_all(tables, unnamed) == []
+
+
+def test_only_controls_and_what_scrolls_are_tab_stops(visit: Visit) -> None:
+    visit.page.set_viewport_size(book.DESKTOP)
+    visit.page.evaluate(book.AT_REST)
+    others = """nodes => nodes.filter((node) => node.tabIndex >= 0 && node.checkVisibility()
+        && !node.matches('a, button, input, select, textarea, summary, video, [role=slider], [role=button]')
+        && node.scrollWidth <= node.clientWidth && node.scrollHeight <= node.clientHeight)
+      .map((node) => node.outerHTML.slice(0, 120))"""
+    assert visit.page.eval_on_selector_all("[tabindex]", others) == []
+
+
+def test_page_describes_itself(visit: Visit) -> None:
+    """To search engines and in previews: not in a picture's markup, nor in TeX."""
+    if visit.name == "404.html":
+        assert visit.page.locator("meta[name=robots]").get_attribute("content") == "noindex"
+        return
+    described = visit.page.locator("meta[name=description]").get_attribute("content")
+    assert described
+    assert 20 < len(described) <= 200
+    assert not set(described) & set("\\${}<>")
+    tag = visit.page.locator
+    assert tag("meta[property='og:description']").get_attribute("content") == described
+    assert tag("meta[property='og:title']").get_attribute("content") in visit.page.title()
+
+
 def test_images_have_alt_text(visit: Visit) -> None:
     """Words, not the file's name, which docutils puts where no alt text is given."""
     images = visit.page.eval_on_selector_all(

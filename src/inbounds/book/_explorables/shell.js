@@ -87,7 +87,8 @@
     inbounds.refresh(doc);
     for (const slider of all(doc, "Slider")) label(slider, views.find_one(slider));
     for (const plot of all(doc, "Figure")) {
-      const { el } = views.find_one(plot);
+      const { el, canvas_view } = views.find_one(plot);
+      canvas_view.events_el.removeAttribute("tabindex"); // the sliders answer the keyboard; the picture does not
       el.setAttribute("role", "img");
       el.setAttribute("aria-label", container.dataset.alt);
     }

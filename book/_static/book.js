@@ -1,0 +1,43 @@
+/* What the theme leaves to do once a page is laid out: breaks in formulas, and a keyboard for what scrolls. */
+(() => {
+  "use strict";
+
+  /* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space behind them. */
+  const OPERATOR = "mjx-container:not([display]) > mjx-math > :is(mjx-mo, mjx-texatom) + :is([space='3'], [space='4'])";
+  const allowBreaks = () => {
+    for (const next of document.querySelectorAll(OPERATOR)) next.before(document.createElement("wbr"));
+  };
+
+  const SCROLLERS = "article :is(table, div.math mjx-container, figure):not(.inbounds-explorable *)";
+  const heading = (node) => node.closest("section")?.querySelector(":is(h1, h2, h3, h4, h5, h6)")?.firstChild?.textContent;
+  const label = (node) => {
+    if (node.matches("table")) return `Table: ${heading(node) ?? document.title}`;
+    const number = node.closest("div.math")?.querySelector(".eqno")?.firstChild?.textContent ?? "";
+    return node.matches("figure") ? "Figure" : `Formula ${number}`.trim();
+  };
+
+  /* What scrolls is a stop of the Tab key and has a name; what does not is none. */
+  const update = (node) => {
+    if (node.scrollWidth <= node.clientWidth) return node.removeAttribute("tabindex");
+    node.tabIndex = 0;
+    if (!node.caption) node.setAttribute("aria-label", label(node));
+    if (!node.matches("table, figure")) node.role = "group";
+  };
+
+  /* Two buttons of the header show more than their labels say: "Search this book", and which mode is on. */
+  document.querySelectorAll(".search-button-field").forEach((button) => button.removeAttribute("aria-label"));
+  const MODES = { light: "Light", dark: "Dark", auto: "System Settings" };
+  const root = document.documentElement;
+  const nameMode = () => document.querySelectorAll(".theme-switch-button").forEach((button) => {
+    button.ariaLabel = `Color mode: ${MODES[root.dataset.mode]}`;
+  });
+  new MutationObserver(nameMode).observe(root, { attributeFilter: ["data-mode"] });
+  nameMode();
+
+  addEventListener("load", async () => {
+    await window.MathJax?.startup?.promise;
+    allowBreaks();
+    const sizes = new ResizeObserver((entries) => entries.forEach((entry) => update(entry.target)));
+    document.querySelectorAll(SCROLLERS).forEach((node) => sizes.observe(node));
+  });
+})();
