@@ -1,4 +1,4 @@
-"""The order in which workers take up files: notebooks, files with slow tests, the rest; within each, the most tests first.
+"""The order in which workers take up files: notebooks, files with slow tests, the rest; the most tests first.
 
 Loaded with ``pytest -p tests.longest_first --no-loadscope-reorder``. A worker takes a whole file; what is long must not
 come last, when the other workers have nothing left to do.

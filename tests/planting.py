@@ -17,7 +17,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "inbounds"
 LIBRARIES = [
-    *("pytest", "hypothesis", "torch", "scipy.stats", "mpmath", "mujoco", "gymnasium", "pyarrow.parquet", "tyro"),
+    *(
+        "pytest",
+        "hypothesis",
+        "torch",
+        "scipy.stats",
+        "mpmath",
+        "mujoco",
+        "gymnasium",
+        "pyarrow.parquet",
+        "tyro",
+    ),
     *("matplotlib.pyplot", "bokeh.plotting"),
 ]
 ANOTHER_PACKAGE = 70

@@ -1,5 +1,6 @@
 """Each planted error is noticed by the test that claims to notice it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,3 +42,25 @@ def test_all_pass_without_a_mutant(tmp_path: Path) -> None:
     planting.copy_package(tmp_path)
     status, said = planting.run_tests(sorted({mutant.test for mutant in MUTANTS}), tmp_path)
     assert status == pytest.ExitCode.OK, said[-4000:]
+
+
+SOUND = Mutant(
+    "nothing is changed but a comment",
+    "distributions/bounds.py",
+    "from __future__ import annotations",
+    "from __future__ import annotations  # unharmed",
+    "tests/distributions/test_contract.py::test_kl_needs_equal_bounds",
+)
+
+
+@pytest.mark.parametrize(
+    ("mutant", "status"),
+    [
+        (SOUND, pytest.ExitCode.OK),
+        (replace(SOUND, new="raise ValueError"), pytest.ExitCode.INTERRUPTED),
+        (replace(SOUND, test="tests/distributions/test_contract.py::test_gone"), pytest.ExitCode.USAGE_ERROR),
+    ],
+    ids=["nobody notices", "nothing can be imported", "the test is gone"],
+)
+def test_what_is_not_noticed_by_its_test_is_not_killed(mutant: Mutant, status: int, tmp_path: Path) -> None:
+    assert outcome(mutant, tmp_path)[0] == status != FAILED

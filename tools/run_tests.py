@@ -40,7 +40,9 @@ def run(arguments: list[str], expected: set[str]) -> int:
         cases = list(ElementTree.parse(record).getroot().iter("testcase")) if record.exists() else []
     passed, failed = Counter(), Counter()
     for case in cases:
-        outcomes = failed if any(case.find(how) is not None for how in ("failure", "error", "skipped")) else passed
+        outcomes = (
+            failed if any(case.find(how) is not None for how in ("failure", "error", "skipped")) else passed
+        )
         outcomes[kind(case)] += 1
     print("\n── summary")
     for each in sorted(expected):
@@ -76,7 +78,8 @@ def main() -> int:
         several = PARALLEL if len(options.notebooks) > 1 else []
         bad = run([*nbval, *several, *options.notebooks], {"notebooks"})
     else:
-        notebooks = [str(path) for path in (ROOT / "notebooks").glob("*.ipynb")]
+        notebooks = [str(path) for path in sorted((ROOT / "notebooks").glob("*.ipynb"))]
+        notebooks.append("tools/chapter_template.ipynb")
         everything = ["-m", "not pages", *nbval, *PARALLEL, *notebooks, "tests"]
         bad = run(everything, {"notebooks", "package and book"})
     return 1 if bad else 0
