@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 NB ?= $(wildcard notebooks/*.ipynb)
 PORT ?= 8000
 
-.PHONY: help setup book test check format notebooks pages serve lab bench dist clean distclean
+.PHONY: help setup book quick test check format notebooks pages serve lab bench dist clean distclean
 
 help:  ## list these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -21,7 +21,10 @@ setup:  ## create .venv and install the pinned packages (the other targets do th
 book: setup  ## execute the notebooks, build the HTML book, print its path  (FORCE=1: from nothing)
 	@$(PY) tools/build_book.py $(if $(FORCE),--force)
 
-test: setup  ## pytest on the package and the book, then nbval on the notebooks
+quick: setup  ## format, lint, types and the fast tests  (two minutes; while you work)
+	@$(PY) tools/run_checks.py format lint types && $(PY) tools/run_tests.py --quick
+
+test: setup  ## pytest on the package and the book, nbval on the notebooks
 	@$(PY) tools/run_tests.py
 
 check: setup  ## format, lint, types, doctests, stored notebooks

@@ -1,4 +1,4 @@
-"""What every test finds: PyTorch's distributions check their arguments.
+"""What every test finds: a temporary folder that goes with the session, and distributions that check their arguments.
 
 TorchRL switches these checks off while it is imported, for all distributions and for all that runs later in the
 process. A module of tests that wants it so says `CHECKED_ARGUMENTS = False`.
@@ -7,6 +7,8 @@ process. A module of tests that wants it so says `CHECKED_ARGUMENTS = False`.
 import sys
 
 import pytest
+
+from tests.temporary import pytest_configure  # noqa: F401
 
 
 @pytest.fixture(autouse=True)

@@ -1,28 +1,22 @@
 """Each planted error is noticed by the test that claims to notice it."""
 
-import os
-import shutil
-import subprocess
-import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from tests import planting
 from tests.mutants import MUTANTS, Mutant
 
-ROOT = Path(__file__).resolve().parents[1]
+FAILED = pytest.ExitCode.TESTS_FAILED
 
 
-def run_tests(nodes: list[str], source: Path) -> subprocess.CompletedProcess:
-    """Run tests against the package in ``source`` instead of the installed one."""
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *nodes],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def outcome(mutant: Mutant, folder: Path) -> tuple[int | None, str]:
+    """Plant a mutant in a copy of the package; return the exit status of its test, and what it said."""
+    target = planting.copy_package(folder) / mutant.file
+    sound = target.read_text(encoding="utf8")
+    target.write_text(sound.replace(mutant.old, mutant.new), encoding="utf8")
+    return planting.run_tests([mutant.test], folder)
 
 
 def test_there_are_enough() -> None:
@@ -32,29 +26,41 @@ def test_there_are_enough() -> None:
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
 def test_the_snippet_is_still_there(mutant: Mutant) -> None:
-    assert (ROOT / "src" / "inbounds" / mutant.file).read_text(encoding="utf8").count(mutant.old) == 1
+    assert (planting.PACKAGE / mutant.file).read_text(encoding="utf8").count(mutant.old) == 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
 def test_killed(mutant: Mutant, tmp_path: Path) -> None:
-    copy = tmp_path / "src"
-    shutil.copytree(
-        ROOT / "src" / "inbounds", copy / "inbounds", ignore=shutil.ignore_patterns("__pycache__")
-    )
-    target = copy / "inbounds" / mutant.file
-    target.write_text(target.read_text(encoding="utf8").replace(mutant.old, mutant.new), encoding="utf8")
-    done = run_tests([mutant.test], copy)
-    assert done.returncode == 1, (
-        f"{mutant.name} survived {mutant.test}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
-    )
+    status, said = outcome(mutant, tmp_path)
+    assert status == FAILED, f"{mutant.name} survived {mutant.test}\n{said[-4000:]}"
 
 
 @pytest.mark.slow
 def test_all_pass_without_a_mutant(tmp_path: Path) -> None:
     """The named tests pass on an unharmed copy: what kills a mutant is the mutation."""
-    shutil.copytree(
-        ROOT / "src" / "inbounds", tmp_path / "inbounds", ignore=shutil.ignore_patterns("__pycache__")
-    )
-    done = run_tests(sorted({mutant.test for mutant in MUTANTS}), tmp_path)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    planting.copy_package(tmp_path)
+    status, said = planting.run_tests(sorted({mutant.test for mutant in MUTANTS}), tmp_path)
+    assert status == pytest.ExitCode.OK, said[-4000:]
+
+
+SOUND = Mutant(
+    "nothing is changed but a comment",
+    "distributions/bounds.py",
+    "from __future__ import annotations",
+    "from __future__ import annotations  # unharmed",
+    "tests/distributions/test_contract.py::test_kl_needs_equal_bounds",
+)
+
+
+@pytest.mark.parametrize(
+    ("mutant", "status"),
+    [
+        (SOUND, pytest.ExitCode.OK),
+        (replace(SOUND, new="raise ValueError"), pytest.ExitCode.INTERRUPTED),
+        (replace(SOUND, test="tests/distributions/test_contract.py::test_gone"), pytest.ExitCode.USAGE_ERROR),
+    ],
+    ids=["nobody notices", "nothing can be imported", "the test is gone"],
+)
+def test_what_is_not_noticed_by_its_test_is_not_killed(mutant: Mutant, status: int, tmp_path: Path) -> None:
+    assert outcome(mutant, tmp_path)[0] == status != FAILED

@@ -77,7 +77,7 @@ def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
     ]
 
 
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -85,7 +85,7 @@ def main() -> int:
     mode.add_argument("--write", action="store_true")
     mode.add_argument("--check", action="store_true")
     parser.add_argument("notebooks", nargs="*", type=Path)
-    args = parser.parse_args()
+    args = parser.parse_args(arguments)
 
     failures = 0
     for path in args.notebooks or sorted((ROOT / "notebooks").glob("*.ipynb")):

@@ -1,10 +1,13 @@
-"""`make test`: pytest on the package and the book, then nbval on the notebooks; one summary, non-zero on any failure.
+"""`make test`: pytest on the package and the book, nbval on the notebooks; one summary, non-zero on any failure.
 
-    python tools/run_tests.py [NOTEBOOK ...]    with notebooks named, only nbval on those
+    python tools/run_tests.py                   everything but the browser
+    python tools/run_tests.py --quick           neither notebooks nor slow tests
+    python tools/run_tests.py NOTEBOOK ...      nbval on these notebooks only
     python tools/run_tests.py --cell-timeout 30 NOTEBOOK ...    and no cell may take longer than that [s]
 
-A test that was skipped or expected to fail did not pass: nbval marks the cells after a dead kernel as expected
-failures, and would otherwise end in green.
+All of it is one session, so that no worker is without work as long as another has a file to spare. A test that was
+skipped or expected to fail did not pass: nbval marks the cells after a dead kernel as expected failures, and would
+otherwise end in green.
 """
 
 import argparse
@@ -14,34 +17,44 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PARALLEL = ["-n", "2", "--dist", "loadscope"]
-PACKAGE = ["-m", "not pages", *PARALLEL, "tests"]
+WORKERS = max(2, min(4, os.cpu_count() or 1))  # each takes one core and up to 1.5 GB
+PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
-NOTEBOOKS = ["-p", "tests.nbval_rules", "--nbval", *PARALLEL]
+NBVAL = ["-p", "tests.nbval_rules", "--nbval"]
 
 
-def run(label: str, arguments: list[str]) -> tuple[str, int]:
-    """Run pytest, read its own record of the outcome, and return one line and the number of tests not passed."""
+def run(arguments: list[str], expected: set[str]) -> int:
+    """Run pytest, print its own record of the outcome by kind of test, and return the number of tests not passed."""
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "record.xml"
         command = [sys.executable, "-m", "pytest", "-q", "-o", "xfail_strict=true", f"--junitxml={record}"]
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        status = subprocess.run([*command, *arguments], cwd=ROOT, env=environment, check=False).returncode
-        suites = ElementTree.parse(record).getroot().iter("testsuite") if record.exists() else []
-        counts = [
-            {key: int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped")}
-            for suite in suites
-        ]
-    total = {key: sum(count[key] for count in counts) for key in ("tests", "failures", "errors", "skipped")}
-    bad = total["failures"] + total["errors"] + total["skipped"]
-    if total["tests"] == 0 or (status and not bad):
-        bad += 1  # nothing collected, or pytest itself failed
-    line = f"{label}: {total['tests'] - bad if bad <= total['tests'] else 0} passed, {bad} failed"
-    return f"{line}  ({time.perf_counter() - start:.0f} s)", bad
+        status = subprocess.run(
+            [*command, "-p", "tests.temporary", *arguments], cwd=ROOT, env=environment, check=False
+        ).returncode
+        cases = list(ElementTree.parse(record).getroot().iter("testcase")) if record.exists() else []
+    passed, failed = Counter(), Counter()
+    for case in cases:
+        outcomes = (
+            failed if any(case.find(how) is not None for how in ("failure", "error", "skipped")) else passed
+        )
+        outcomes[kind(case)] += 1
+    print("\n── summary")
+    for each in sorted(expected):
+        print(f"{each}: {passed[each]} passed, {failed[each]} failed")
+    print(f"in {time.perf_counter() - start:.0f} s", flush=True)
+    missing = sum(not passed[each] for each in expected)
+    return sum(failed.values()) + missing + (status != 0)  # nothing collected, or pytest itself failed
+
+
+def kind(case: ElementTree.Element) -> str:
+    """Whether a test case is a cell of a notebook."""
+    return "notebooks" if case.get("classname", "").endswith(".ipynb") else "package and book"
 
 
 def main() -> int:
@@ -49,6 +62,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("notebooks", nargs="*", metavar="NOTEBOOK")
+    parser.add_argument("--quick", action="store_true", help="neither notebooks nor slow tests")
     parser.add_argument(
         "--cell-timeout",
         type=int,
@@ -57,14 +71,18 @@ def main() -> int:
         help="after which a cell of a notebook fails",
     )
     options = parser.parse_args()
-    named = options.notebooks
-    notebooks = named or sorted(str(path) for path in (ROOT / "notebooks").glob("*.ipynb"))
-    outcomes = [] if named else [run("package and book", PACKAGE)]
-    outcomes.append(
-        run("notebooks", [*NOTEBOOKS, f"--nbval-cell-timeout={options.cell_timeout}", *notebooks])
-    )
-    print("\n── summary", *(line for line, _ in outcomes), sep="\n")
-    return 1 if any(bad for _, bad in outcomes) else 0
+    nbval = [*NBVAL, f"--nbval-cell-timeout={options.cell_timeout}"]
+    if options.quick:
+        bad = run(["-m", "not slow and not pages", *PARALLEL, "tests"], {"package and book"})
+    elif options.notebooks:
+        several = PARALLEL if len(options.notebooks) > 1 else []
+        bad = run([*nbval, *several, *options.notebooks], {"notebooks"})
+    else:
+        notebooks = [str(path) for path in sorted((ROOT / "notebooks").glob("*.ipynb"))]
+        notebooks.append("tools/chapter_template.ipynb")
+        everything = ["-m", "not pages", *nbval, *PARALLEL, *notebooks, "tests"]
+        bad = run(everything, {"notebooks", "package and book"})
+    return 1 if bad else 0
 
 
 if __name__ == "__main__":

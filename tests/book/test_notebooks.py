@@ -9,6 +9,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
+from tools import notebook_hook
+
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
@@ -62,15 +64,8 @@ def test_there_are_notebooks() -> None:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
-def test_stored_notebook_is_clean(path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "tools/notebook_hook.py", "--check", path],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_stored_notebook_is_clean(path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert notebook_hook.main(["--check", str(path)]) == 0, capsys.readouterr().out
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
@@ -225,19 +220,12 @@ def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_the_hook_sees(tmp_path: Path, plant, complaint: str) -> None:
+def test_the_hook_sees(tmp_path: Path, plant, complaint: str, capsys: pytest.CaptureFixture) -> None:
     notebook = small_notebook(tmp_path)
     plant(notebook.cells[1])
     nbformat.write(notebook, tmp_path / "chapter.ipynb")
-    done = subprocess.run(
-        [sys.executable, "tools/notebook_hook.py", "--check", str(tmp_path / "chapter.ipynb")],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert complaint in done.stdout
+    assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == 1
+    assert complaint in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -1,0 +1,29 @@
+"""A session of tests has a temporary folder of its own, and takes it away at its end.
+
+Peers write logs into the temporary folder, Sphinx its tracebacks, PyTorch its caches. Loaded by ``tests/conftest.py``,
+and with ``pytest -p tests.temporary`` where that file is not read: for doctests and for notebooks.
+What pytest keeps of a test that failed (``tmp_path``) lies elsewhere, and stays.
+"""
+
+import os
+import shutil
+import tempfile
+from unittest import mock
+
+import pytest
+
+
+@pytest.hookimpl(trylast=True)  # after pytest has decided where its own folder is
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the folder, and send this process and those that it starts there."""
+    if hasattr(config, "workerinput"):
+        return  # a worker of pytest-xdist inherits the folder
+    config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+    folder = tempfile.mkdtemp(prefix="inbounds-tests-")
+    config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+    for patch in (
+        mock.patch.dict(os.environ, TMPDIR=folder),
+        mock.patch.object(tempfile, "tempdir", folder),
+    ):
+        patch.start()
+        config.add_cleanup(patch.stop)
