@@ -5,18 +5,21 @@ built book needs no other file. It starts when the reader asks, ends after at mo
 most 120 kB. The encoder is the ffmpeg that the package ``imageio-ffmpeg`` brings along.
 """
 
+from __future__ import annotations
+
 import base64
 import html
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inbounds.robots.rendering import Film
+if TYPE_CHECKING:  # what encodes a film needs no MuJoCo
+    from inbounds.robots.rendering import Film
 
 MAX_SECONDS = 5.0
 MAX_BYTES = 120_000

@@ -59,6 +59,7 @@ def _run(args: list[str]) -> int:
     # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
     from inbounds.cli import benchmark, options, training, watching
     from inbounds.cli.errors import CommandError
+    from inbounds.robots.headless import BackendError
 
     try:
         if args[:1] == ["bench"] and benchmark.find_root():
@@ -81,3 +82,6 @@ def _run(args: list[str]) -> int:
     except CommandError as error:
         print(f"inbounds: {error}", file=sys.stderr)
         return error.exit_code
+    except BackendError as error:
+        print(f"inbounds: {error}", file=sys.stderr)
+        return 1

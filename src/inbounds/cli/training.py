@@ -13,6 +13,7 @@ from typing import Any
 
 import gymnasium
 
+from inbounds import robots  # its names are imported on first use, and MuJoCo with them
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Train
 from inbounds.cli.progress import TrainingProgress
@@ -23,8 +24,8 @@ from inbounds.learning.rollout import check_environments
 from inbounds.learning.run_store import CHECKPOINT_FILE, CURVES_FILE, POLICIES_FILE, load_checkpoint, save_run
 from inbounds.learning.stored_config import FREE_TO_CHANGE, differences
 from inbounds.learning.training import Record, make_environments
+from inbounds.robots.headless import BackendError
 from inbounds.robots.registration import TASK_NAMES
-from inbounds.robots.rendering import is_drawable
 
 
 class Stop:
@@ -138,7 +139,7 @@ class _Session:
             else f"there was nothing to do: {start} epochs are done"
         )
         print(f"{done}. {self.run_dir} has {CURVES_FILE}, {POLICIES_FILE} and {CHECKPOINT_FILE}")
-        if is_drawable(trainer.envs):
+        if robots.is_drawable(trainer.envs):
             print(f"film it: inbounds watch {self.run_dir}")
         return 0
 
@@ -165,6 +166,8 @@ def _check_environment(config: TrainConfig) -> None:
         envs = make_environments(config, 1)
         check_environments(envs, 1)
         envs.close()
+    except BackendError:
+        raise
     except gymnasium.error.UnregisteredEnv as error:
         close = difflib.get_close_matches(config.env, [*TASK_NAMES, *gymnasium.registry], n=1)
         meant = f"did you mean {close[0]}? " if close else ""

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from numpy.typing import NDArray
 
+from inbounds import robots  # its names are imported on first use, and MuJoCo with them
 from inbounds.book.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError
 from inbounds.cli.options import Watch
@@ -17,7 +18,6 @@ from inbounds.learning.files import is_disk_full
 from inbounds.learning.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.trained_policy import TrainedPolicy
 from inbounds.learning.training import make_environments
-from inbounds.robots import record
 
 
 def run(command: Watch) -> int:
@@ -45,7 +45,7 @@ def run(command: Watch) -> int:
     try:
         require_encoder()  # before the film is made, not after
         envs = RecordEpisodeStatistics(make_environments(policy.config, 1))
-        film = record(
+        film = robots.record(
             envs,
             act,
             seconds=command.seconds,

@@ -34,6 +34,7 @@ from inbounds.learning.policies import Policy
 from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 from inbounds.learning.stored_config import FREE_TO_CHANGE, describe, differences
+from inbounds.robots.headless import naming_the_backend
 from inbounds.robots.registration import TASK_NAMES
 from inbounds.robots.registration import make as make_robots
 
@@ -250,9 +251,10 @@ def make_environments(config: TrainConfig, num_envs: int) -> Environments:
     """
     if config.env.removeprefix("inbounds/") in TASK_NAMES:
         return make_robots(config.env, num_envs, action_mode=config.action_mode)
-    return SyncVectorEnv(
-        [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
-    )
+    with naming_the_backend():  # Gymnasium has robots, too
+        return SyncVectorEnv(
+            [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
+        )
 
 
 def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs import registration
 
+from inbounds.robots.headless import naming_the_backend
+
 if TYPE_CHECKING:
     from inbounds.robots.vector_env import RobotVectorEnv
 
@@ -36,7 +38,8 @@ def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
         >>> envs.reset(seed=0)[0].shape
         (10, 11)
     """
-    from inbounds.robots.vector_env import RobotVectorEnv
+    with naming_the_backend():
+        from inbounds.robots.vector_env import RobotVectorEnv
 
     return RobotVectorEnv(name.removeprefix(f"{NAMESPACE}/"), num_envs, **kwargs)
 
