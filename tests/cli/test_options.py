@@ -122,7 +122,10 @@ def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
         ("train --policy beta --policy.no-state-dependent-std", "state_dependent_std=True"),
         ("train HalfCheeta-v5", "did you mean HalfCheetah-v5?"),
         ("train Tennis-v0", "The tasks are Hopper-v5, Walker2d-v5"),
-        ("train CartPole-v1", "bounded, one-dimensional Box, got Discrete(2): wrap"),
+        (
+            "train CartPole-v1",
+            "actions must be points of a bounded, one-dimensional Box, got Discrete(2): wrap",
+        ),
         ("walk", "train, watch, bench"),
     ],
 )

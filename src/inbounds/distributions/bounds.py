@@ -26,6 +26,7 @@ __all__ = [
     "SigmoidMapped",
     "TensorLike",
     "as_parameters",
+    "require_bounds",
     "require_equal_bounds",
 ]
 
@@ -232,6 +233,27 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
             "of shape [..., act_dim]."
         ) from None
     return dict(zip(given, tensors, strict=True))
+
+
+def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
+    """Return the two bounds as tensors of torch's default type and one shape, checked whatever torch's settings are.
+
+    Args:
+        low: `[...]` lower bounds.
+        high: `[...]` upper bounds.
+
+    Raises:
+        ValueError: some are not finite or not in order, or no floating-point number lies between them.
+
+    Example:
+        >>> require_bounds(-1.0, np.inf)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. An unbounded ...
+    """
+    tensors = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in (low, high))
+    low, high = as_parameters(low=next(tensors), high=next(tensors)).values()
+    _check_bounds("action box", low, high)
+    return low, high
 
 
 def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None:

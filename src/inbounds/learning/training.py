@@ -26,6 +26,7 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
+from inbounds.distributions.boxes import require_box
 from inbounds.learning import checkpoint
 from inbounds.learning.actor_critic import ActorCritic
 from inbounds.learning.config import ALGORITHMS, TrainConfig
@@ -74,12 +75,8 @@ class Trainer:
         self.streams = [SeedStreams.of(seed) for seed in config.seeds]
         num_seeds = len(config.seeds)
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
-        space = self.envs.single_action_space
-        if not isinstance(space, gymnasium.spaces.Box):
-            raise ValueError(
-                f"actions must be a bounded, one-dimensional Box, got {space}: wrap the environment "
-                "(gymnasium.wrappers.RescaleAction, FlattenAction) so that they are"
-            )
+        space: Any = self.envs.single_action_space
+        require_box(space)
         policy = Policy(config.policy, space.low, space.high)
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
