@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import inbounds
 from inbounds.cli import options
 from inbounds.learning import FAMILIES, NetworkConfig, PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
@@ -139,6 +140,11 @@ def test_a_wrong_command_line_is_told_the_right_one(
     assert message in err
     assert out == ""
     assert not list(tmp_path.iterdir())  # a mistyped command leaves nothing behind
+
+
+def test_the_version() -> None:
+    assert run("--version") == (0, f"inbounds {inbounds.__version__}\n", "")
+    assert "inbounds --version" in " ".join(run("--help")[1].split())
 
 
 def test_as_a_module_in_a_process_of_its_own() -> None:

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inbounds.learning.files import write_whole
+
 if TYPE_CHECKING:  # what encodes a film needs no MuJoCo
     from inbounds.robots.rendering import Film
 
@@ -132,6 +134,7 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
     Raises:
         ValueError: odd width or height.
         RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
+        OSError: it could not be written, as on a full disk; nothing is left of it.
 
     Example:
         >>> import tempfile
@@ -142,7 +145,7 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
         True
     """
     path = Path(path)
-    path.write_bytes(_encode(film, _FILE_QUANTISER))
+    write_whole(path, _encode(film, _FILE_QUANTISER))
     return path
 
 

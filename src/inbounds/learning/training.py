@@ -89,6 +89,8 @@ class Trainer:
         self.optimizer = self._algorithm.make_optimizer(self.networks, config.algorithm)
         self.records: list[Record] = []
         self.diverged = np.zeros(num_seeds, np.bool_)
+        self.fed_nonsense = np.zeros(num_seeds, np.bool_)
+        """`[S]` which seeds have diverged in this process because of an observation or a reward that was not finite."""
 
     def epoch(self) -> Record:
         """Collect one rollout, do one update, and return the record, which also joins `records`."""
@@ -115,7 +117,11 @@ class Trainer:
     def _mark_diverged(self, rollout: Rollout) -> None:
         """Mark, and warn of, the seeds whose weights have just ceased to be finite; say where that came from."""
         now = ~self.networks.finite().numpy()
-        received = (rollout.obs.isfinite().all(2) & rollout.reward.isfinite()).all(1).numpy()
+        finite = rollout.obs.isfinite().all(2) & rollout.reward.isfinite() & rollout.bootstrap.isfinite()
+        received = finite.all(
+            1
+        ).numpy()  # [S]; the bootstrap has seen the last observations of rollout and episodes
+        self.fed_nonsense |= now & ~self.diverged & ~received
         for new, advice in (
             (now & ~self.diverged & received, "train with a smaller learning_rate"),
             (

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -284,7 +285,7 @@ def _damaged(path: Path, reason: object) -> DamagedFileError:
 
 def restore(path: Path) -> str:
     """Return what to do about a damaged result."""
-    return f"restore it (git checkout -- {path}), or delete it and run the cell again"
+    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and run the cell again"
 
 
 # ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch
