@@ -212,7 +212,8 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
         ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
     """
     given = {
-        name: torch.tensor(value) if isinstance(value, np.ndarray | np.generic) else value
+        # A tuple of types: torch.compile cannot trace a union.
+        name: torch.tensor(value) if isinstance(value, (np.ndarray, np.generic)) else value
         for name, value in parameters.items()
     }
     own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]

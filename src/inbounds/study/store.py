@@ -257,7 +257,7 @@ def read_cell(path: str | Path) -> pa.Table:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError) as error:
-        raise _damaged(Path(path), error) from error
+        raise damaged(Path(path), error) from error
 
 
 def read_metadata(path: str | Path) -> dict[str, Any]:
@@ -272,13 +272,14 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-        raise _damaged(Path(path), error) from error
+        raise damaged(Path(path), error) from error
     if not {"config", "study_version", "id"} <= found.keys():
-        raise _damaged(Path(path), "it is no cell of a study")
+        raise damaged(Path(path), "it is no cell of a study")
     return found
 
 
-def _damaged(path: Path, reason: object) -> DamagedFileError:
+def damaged(path: Path, reason: object) -> DamagedFileError:
+    """Return the error that says what is wrong with a result and what to do."""
     said = (str(reason) or type(reason).__name__).splitlines()[0]
     return DamagedFileError(f"{path} is damaged ({said[:120]}): {restore(path)}")
 
