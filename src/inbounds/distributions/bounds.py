@@ -65,7 +65,8 @@ class BoundedDistribution(Distribution):
 
     Args:
         validate_args: check parameters and values (None: as `torch.distributions` is set, on by default). Inside
-            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor.
+            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor. Code compiled by
+            `torch.compile` checks nothing.
         **parameters: `[...]` each; numbers, tensors or arrays that broadcast together, `low` and `high` among them.
 
     Raises:
@@ -84,6 +85,10 @@ class BoundedDistribution(Distribution):
     def __init__(self, *, validate_args: bool | None = None, **parameters: TensorLike) -> None:
         for name, value in as_parameters(**parameters).items():
             setattr(self, name, value)
+        if torch.compiler.is_compiling():
+            validate_args = (
+                False  # compiled code cannot branch on numbers; torch switches off its own checks, too
+            )
         if validate_args if validate_args is not None else self._validate_args:
             _check_bounds(type(self).__name__, self.low, self.high)
         super().__init__(self.low.shape, validate_args=validate_args)
@@ -260,6 +265,8 @@ def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
 def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None:
     """Raise unless p and q live on the same interval: otherwise their KL divergence is infinite or meaningless.
 
+    Not in compiled code (`torch.compile`), where nothing can be checked.
+
     Args:
         p: a law with bounds.
         q: another.
@@ -267,6 +274,8 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
     Raises:
         ValueError: the bounds differ anywhere.
     """
+    if torch.compiler.is_compiling():  # which cannot branch on numbers
+        return
     if bool(((p.low != q.low) | (p.high != q.high)).any()):
         raise ValueError(
             "the KL divergence needs equal bounds, but "
