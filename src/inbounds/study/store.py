@@ -30,6 +30,7 @@ from inbounds.learning.stored_config import differences
 from inbounds.study.claim import file_lock
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 
+ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
@@ -96,6 +97,22 @@ class StudyFolder:
 
     results: Path = Path("results")
     work: Path = Path("runs/study")
+
+    @classmethod
+    def shipped(cls, root: Path = ROOT) -> StudyFolder:
+        """Return the folders of the study that the project ships, wherever Python was started.
+
+        Args:
+            root: of the source tree.
+
+        Raises:
+            FileNotFoundError: there are no results: the package was installed without its source tree.
+        """
+        if not (root / "results" / "PROTOCOL.md").is_file():
+            raise FileNotFoundError(
+                "the study is not part of the installed package: clone the project, and `pip install -e .` in it"
+            )
+        return cls(root / "results", root / "runs" / "study")
 
     def cell_file(self, cell: Cell) -> Path:
         """Return the path of a cell's rows."""
