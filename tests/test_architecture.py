@@ -1,10 +1,12 @@
 """The rules of the house: imports go one way, the package is light, files stay readable."""
 
 import ast
+import fnmatch
 import importlib
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -110,3 +112,20 @@ def test_whatever_is_documented_has_an_example_or_says_who_has(name: str) -> Non
     module, _, thing = name.rpartition(".")
     doc = getattr(importlib.import_module(module), thing).__doc__
     assert ">>>" in doc or "has an example" in doc
+
+
+def test_the_wheel_says_that_the_package_is_typed() -> None:
+    """Hatch packs what lies in `packages` and git does not ignore."""
+    marker = PACKAGE / "py.typed"
+    assert marker.is_file()
+    project = tomllib.loads((PACKAGE.parents[1] / "pyproject.toml").read_text(encoding="utf8"))
+    assert project["tool"]["hatch"]["build"]["targets"]["wheel"] == {"packages": ["src/inbounds"]}
+    ignored = (PACKAGE.parents[1] / ".gitignore").read_text(encoding="utf8").splitlines()
+    assert not any(fnmatch.fnmatch(marker.name, line) for line in ignored)
+
+
+@pytest.mark.parametrize(
+    "path", sorted((PACKAGE.parents[1] / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem
+)
+def test_a_chapter_finds_the_study_wherever_it_is_run(path: Path) -> None:
+    assert 'Path(\\"results\\")' not in path.read_text(encoding="utf8"), "use StudyFolder.shipped()"

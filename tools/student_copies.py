@@ -97,11 +97,13 @@ def hand_out(chapters: Path, folder: Path) -> dict[str, str]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     ledger_file = folder / LEDGER
-    ledger = json.loads(ledger_file.read_text(encoding="utf8")) if ledger_file.exists() else {}
+    ledger = read_ledger(ledger_file)
     outcome = {}
     for chapter in sorted(chapters.glob("[0-9]*.ipynb")):
         ours, theirs = written(chapter), folder / chapter.name
         before = digest(theirs.read_text(encoding="utf8")) if theirs.exists() else None
+        if before == digest(ours):  # whatever the ledger says of it: nothing is the student's own
+            ledger[chapter.name] = before
         if before is not None and before != ledger.get(chapter.name):
             outcome[chapter.name] = "kept" if digest(ours) == ledger.get(chapter.name) else "outdated"
             continue
@@ -113,6 +115,25 @@ def hand_out(chapters: Path, folder: Path) -> dict[str, str]:
         ledger[chapter.name] = digest(ours)
     ledger_file.write_text(json.dumps(ledger, indent=1) + "\n", encoding="utf8")
     return outcome
+
+
+def read_ledger(path: Path) -> dict[str, str]:
+    """What was handed out, by name; nothing where the ledger is lost or garbled.
+
+    A notebook that the ledger does not know counts as changed, so a lost ledger costs no student's work.
+    """
+    try:
+        ledger = json.loads(path.read_text(encoding="utf8"))
+    except FileNotFoundError:
+        return {}
+    except ValueError:  # no JSON, or no text
+        ledger = None
+    if isinstance(ledger, dict) and all(isinstance(entry, str) for entry in ledger.values()):
+        return ledger
+    print(
+        f"{path} is garbled and written anew; notebooks that differ from the book's are kept", file=sys.stderr
+    )
+    return {}
 
 
 def write_downloads(chapters: Path, html: Path) -> None:

@@ -7,15 +7,42 @@ refuses to draw while refusing is still possible. Neither imports ``mujoco`` or 
 package stays light.
 """
 
+import contextlib
 import ctypes
 import os
 import sys
+import traceback
+from collections.abc import Iterator
 
 PACKAGES_HINT = "sudo apt install libegl1 libgl1-mesa-dri"
 
 # In the order of preference: EGL draws on a GPU where there is one and in software elsewhere.
 _LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 _SWITCHED_OFF = ("disable", "disabled", "off", "false", "0")
+
+
+class BackendError(ImportError):
+    """MuJoCo cannot be imported with the OpenGL that ``MUJOCO_GL`` names; the message names the fix."""
+
+
+@contextlib.contextmanager
+def naming_the_backend() -> Iterator[None]:
+    """Raise a `BackendError` in the place of whatever ``import mujoco`` raises over its OpenGL in this block.
+
+    MuJoCo refuses an unknown name with a RuntimeError, and PyOpenGL, where a library is missing, trips over a None.
+    """
+    try:
+        yield
+    except BackendError:
+        raise
+    except (AttributeError, ImportError, RuntimeError) as error:
+        frames = traceback.walk_tb(error.__traceback__)
+        if not any(frame.f_globals.get("__name__") == "mujoco" for frame, _ in frames):
+            raise  # about something else
+        raise BackendError(
+            f"MuJoCo cannot be imported with MUJOCO_GL={os.environ.get('MUJOCO_GL')} ({error}): unset it and start "
+            "Python again, or install the library that it names"
+        ) from error
 
 
 def choose_backend() -> str | None:

@@ -176,3 +176,26 @@ def test_downloads_are_student_copies(tmp_path: Path) -> None:
         tool.write_downloads(chapters, tmp_path / "html")
         assert [path.name for path in downloads.iterdir()] == ["01_a.ipynb"]
         assert "secret" not in json.dumps(json.loads((downloads / "01_a.ipynb").read_text()))
+
+
+@pytest.mark.parametrize(
+    "harm", [None, b"", b"not what you think", b"[1, 2]", b'{"01_a.ipynb": 3}', b"\xff\xfe"]
+)
+def test_a_lost_or_garbled_ledger_costs_no_work(harm: bytes | None, tmp_path: Path, capsys) -> None:
+    chapters, folder = tmp_path / "notebooks", tmp_path / "lab"
+    chapters.mkdir()
+    for name in ("01_a.ipynb", "02_b.ipynb"):
+        nbformat.write(exercise(), chapters / name)
+    tool.hand_out(chapters, folder)
+    work = (folder / "02_b.ipynb").read_text().replace("return ...", "return 1")
+    (folder / "02_b.ipynb").write_text(work)
+    if harm is None:
+        (folder / tool.LEDGER).unlink()
+    else:
+        (folder / tool.LEDGER).write_bytes(harm)
+    found = tool.hand_out(chapters, folder)
+    assert found == {"01_a.ipynb": "unchanged", "02_b.ipynb": "outdated"}
+    assert ("is garbled and written anew" in capsys.readouterr().err) is (harm is not None)
+    assert (folder / "02_b.ipynb").read_text() == work
+    assert tool.hand_out(chapters, folder)["01_a.ipynb"] == "unchanged"  # with the new ledger
+    assert list(json.loads((folder / tool.LEDGER).read_text())) == ["01_a.ipynb"]

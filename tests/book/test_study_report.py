@@ -89,6 +89,7 @@ def report(folder: StudyFolder, path: Path) -> Page:
 
 def test_nothing_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "report.html"
+    (tmp_path / "r").mkdir()
     where = ["--results", str(tmp_path / "r"), "--work", str(tmp_path / "w"), "--out", str(out)]
     assert study(["report", *where]) == 0
     assert "0 of 136 cells are finished" in capsys.readouterr().out
@@ -225,6 +226,7 @@ def test_a_file_that_cannot_be_written_is_a_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").touch()
+    (tmp_path / "r").mkdir()
     where = ["--results", str(tmp_path / "r"), "--work", str(tmp_path / "w")]
     assert study(["report", *where, "--out", str(tmp_path / "file" / "report.html")]) == 1
     assert "choose another --out" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import inbounds
 from inbounds.cli import options
 from inbounds.learning import FAMILIES, NetworkConfig, PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
@@ -122,7 +123,10 @@ def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
         ("train --policy beta --policy.no-state-dependent-std", "state_dependent_std=True"),
         ("train HalfCheeta-v5", "did you mean HalfCheetah-v5?"),
         ("train Tennis-v0", "The tasks are Hopper-v5, Walker2d-v5"),
-        ("train CartPole-v1", "bounded, one-dimensional Box, got Discrete(2): wrap"),
+        (
+            "train CartPole-v1",
+            "actions must be points of a bounded, one-dimensional Box, got Discrete(2): wrap",
+        ),
         ("walk", "train, watch, bench"),
     ],
 )
@@ -136,6 +140,11 @@ def test_a_wrong_command_line_is_told_the_right_one(
     assert message in err
     assert out == ""
     assert not list(tmp_path.iterdir())  # a mistyped command leaves nothing behind
+
+
+def test_the_version() -> None:
+    assert run("--version") == (0, f"inbounds {inbounds.__version__}\n", "")
+    assert "inbounds --version" in " ".join(run("--help")[1].split())
 
 
 def test_as_a_module_in_a_process_of_its_own() -> None:

@@ -264,11 +264,25 @@ def test_a_full_disk_keeps_the_last_checkpoint(tmp_path: Path, monkeypatch: pyte
     assert err.count("\n") == 1
     assert "the disk is full" in err
     assert (
-        f"{tmp_path / 'run'} keeps 2 epochs; the same command goes on from there, once there is room" in err
+        f"{tmp_path / 'run'} keeps 2 epochs; the same command goes on from there. Make room first (df -h"
+        in err
     )
     succeeds(small(tmp_path / "run", 6))
     succeeds(small(tmp_path / "whole", 6))
     assert same_rows(read_curves(tmp_path / "run"), read_curves(tmp_path / "whole"))
+
+
+def test_a_disk_that_is_full_from_the_start_names_a_folder_that_exists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    code, _, err = run(*small(tmp_path / "my runs" / "run", 6))
+    assert code == 1
+    assert f"before the first checkpoint: nothing is kept. Make room first (df -h {tmp_path})" in err
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that Linux has")
@@ -280,6 +294,13 @@ def test_a_full_disk_is_recognised_in_what_torch_makes_of_it() -> None:
         disk.close()
     assert is_disk_full(caught.value)
     assert not is_disk_full(RuntimeError("of another kind"))
+
+
+def test_a_name_that_is_too_long(tmp_path: Path) -> None:
+    code, _, err = run(*small(tmp_path / (300 * "a")))
+    assert code == 2
+    assert "too long for the disk" in err
+    assert err.count("\n") == 1
 
 
 def test_where_no_run_directory_can_be(tmp_path: Path) -> None:

@@ -1,3 +1,5 @@
+import errno
+import os
 from pathlib import Path
 
 import gymnasium
@@ -73,6 +75,10 @@ def test_what_has_no_simulation_is_trained_and_not_filmed(tmp_path: Path) -> Non
         ("nowhere", 1, "choose one of {runs}/beta, {runs}/hopper"),
         ("hopper --seed-index 2", 2, "the run has 2 seeds, 0 to 1"),
         ("hopper --seconds 0", 2, "must be positive"),
+        ("hopper --seconds inf", 2, "must be positive numbers"),
+        ("hopper --env-seed -1", 2, "--env-seed must be 0 or more"),
+        (f"hopper --out {300 * 'a'}/film.mp4", 2, "too long for the disk"),
+        ("hopper --seconds 0.1 --width 100000", 1, "choose a smaller width and height"),
         ("hopper --width 63 --seconds 0.1", 2, "must be even"),
         ("hopper --out no/such/folder/film.mp4", 1, "mkdir -p no/such/folder"),
     ],
@@ -83,3 +89,27 @@ def test_what_cannot_be_watched(words: str, code: int, message: str, runs: Path)
     assert got == code
     assert message.format(runs=runs) in err
     assert err.count("\n") == 1
+    assert "libegl1" not in err
+
+
+def test_a_full_disk_leaves_no_film(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    out = tmp_path / "film.mp4"
+    code, _, err = run(
+        "watch", runs / "hopper", "--seconds", "0.1", "--width", "64", "--height", "48", "--out", out
+    )
+    assert code == 1
+    assert "Free some space on the disk" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_paths_with_spaces_are_quoted_in_advice(tmp_path: Path) -> None:
+    out = succeeds(small(tmp_path / "my run", 1))
+    assert f"film it: inbounds watch '{tmp_path / 'my run'}'" in out
+    _, _, err = run("watch", tmp_path / "nowhere")
+    assert f"choose one of '{tmp_path / 'my run'}'" in err
+    _, _, err = run("watch", tmp_path / "my run", "--out", tmp_path / "no folder" / "film.mp4")
+    assert f"mkdir -p '{tmp_path / 'no folder'}'" in err

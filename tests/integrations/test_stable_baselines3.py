@@ -1,6 +1,5 @@
 """The logit-normal in stable-baselines3: it scores actions, stores latents, and is a Gaussian behind a sigmoid."""
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -114,26 +113,34 @@ def test_deterministic_is_the_median_and_survives_the_disk(tmp_path) -> None:
     assert np.array_equal(action, again)
 
 
-class Elsewhere(gymnasium.Env):
-    """A world with another action space."""
-
-    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-
-    def __init__(self, action_space: spaces.Space) -> None:
-        self.action_space = action_space
-
-
 @pytest.mark.parametrize(
     "space",
     [
         spaces.Discrete(3),
         spaces.Box(-1.0, 1.0, (2, 2)),
+        spaces.Box(-np.inf, np.inf, (2,)),
+        spaces.Box(0, 3, (2,), np.int64),
+        spaces.Box(np.float32([-1, 2]), np.float32([1, 2])),
     ],
     ids=str,
 )
 def test_other_action_spaces_are_refused_with_the_fix(space: spaces.Space) -> None:
-    with pytest.raises(ValueError, match="wrap the environment"):
-        PPO(LogitNormalPolicy, Elsewhere(space), device="cpu")
+    with pytest.raises(ValueError, match=r"gymnasium\.wrappers\."):
+        LogitNormalPolicy(Tank.observation_space, space, lambda _: 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wrong"),
+    [
+        (1.0, -1.0, "less than high"),
+        (-1.0, np.inf, "finite"),
+        (np.nan, 1.0, "finite"),
+        (2.0, 2.0, "less than high"),
+    ],
+)
+def test_an_impossible_box_is_refused_at_once(low: float, high: float, wrong: str) -> None:
+    with pytest.raises(ValueError, match=wrong):
+        LogitNormalDistribution(np.float32([-1.0, low]), np.float32([1.0, high]))
 
 
 def test_its_noise_is_its_own() -> None:

@@ -157,3 +157,20 @@ def test_the_divergence_is_exact(law: type) -> None:
 def test_other_laws_are_refused() -> None:
     with pytest.raises(ValueError, match="LogitNormal and ScaledBeta"):
         bounded_actor(network(LogitNormal), ClippedNormal, LOW, HIGH)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("low", "high", "wrong"),
+    [
+        (1.0, -1.0, "less than high"),
+        (-1.0, np.inf, "finite"),
+        (np.nan, 1.0, "finite"),
+        (2.0, 2.0, "less than high"),
+        (1e9, 1e9 + 64, "lies strictly between"),
+    ],
+)
+def test_an_impossible_box_is_refused_at_once(law: type, low: float, high: float, wrong: str) -> None:
+    """Although TorchRL has switched off the checks of every distribution."""
+    with pytest.raises(ValueError, match=wrong):
+        bounded_actor(network(law), law, [-1.0, low], [1.0, high])

@@ -152,7 +152,7 @@ def test_a_readers_own_gymnasium_environment() -> None:
                 * n,
                 autoreset_mode=AutoresetMode.SAME_STEP,
             ),
-            "real numbers.*cut off.*TransformAction",
+            "real numbers.*cut off.*round.*TransformAction",
         ),
         (
             lambda n: SyncVectorEnv(

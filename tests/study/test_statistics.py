@@ -576,3 +576,14 @@ def test_ten_seeds_resolve_about_one_and_a_third_standard_deviations() -> None:
     assert statistics.power(effect, 10, rng(1)) == pytest.approx(0.8, abs=0.015)
     of_six = statistics.smallest_detectable_effect(10, rng(), tests=6)
     assert of_six > 1.25 * effect
+
+
+def test_arrays_are_no_scores_by_environment() -> None:
+    scores = np.arange(20.0).reshape(2, 10)
+    for first, second in (
+        (scores, scores),
+        ({"Hopper-v5": scores[0]}, scores[1]),
+        (scores[0], {"Hopper-v5": scores[1]}),
+    ):
+        with pytest.raises(TypeError, match=r"scores by environment.*ndarray.*`difference`"):
+            statistics.compare(first, second, np.random.default_rng(0))

@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 import threading
 import time
@@ -11,10 +12,15 @@ import pyarrow as pa
 import pytest
 
 import inbounds.robots
-from inbounds.learning import TrainConfig, ppo
-from inbounds.study import StudyFolder, evaluate, read_cell, run_cell, store, verify
+from inbounds.learning import TrainConfig, Trainer, ppo
+from inbounds.learning.storage.files import DamagedFileError
+from inbounds.learning.storage.run_store import save_policies
+from inbounds.study import StudyFolder, evaluate, read_cell, run_cell, select, store, verify
+from inbounds.study.outcomes import Outcomes
 from inbounds.study.verify import TOLERANCE, Finding, check_rerun, first_mismatch
+from tests.cli.small import run
 from tests.study.small import folder_in, small_cell
+from tests.study.synthetic import write_cells
 
 CELL = small_cell(epochs=10, keeps_policies=True)
 
@@ -103,6 +109,7 @@ def test_a_changed_byte_a_missing_and_a_foreign_file_are_found(folder: StudyFold
         f"policies/{CELL.id}.parquet",
         f"policies/{CELL.id}.safetensors",
         "policies/foreign.parquet",
+        CELL.id,  # its policies cannot be read
     ]
 
 
@@ -110,6 +117,119 @@ def test_rows_cut_off_or_of_another_configuration_are_found(folder: StudyFolder)
     republish(folder, read_cell(folder.cell_file(CELL)).slice(0, 18))
     assert "18 rows instead of 20" in bad(verify([CELL], folder, rerun=()))[0]
     assert "another configuration" in bad(verify([small_cell(epochs=20)], folder, rerun=()))[0]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_missing_file_is_found_without_its_line_in_the_list(folder: StudyFolder, which: int) -> None:
+    path = folder.policy_files(CELL)[which]
+    path.unlink()
+    sums = folder.results / "checksums.txt"
+    kept = [line for line in sums.read_text().splitlines() if f"policies/{path.name}" not in line]
+    sums.write_text("\n".join(kept) + "\n")
+    assert (
+        f"policies/{path.name}: missing, and not in checksums.txt" in bad(verify([CELL], folder, rerun=()))[0]
+    )
+
+
+def doubled(table: pa.Table) -> pa.Table:
+    """As many rows as before, one of them twice."""
+    return pa.concat_tables([table.slice(0, 1), table.slice(0, 19)])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (doubled, "a row of epoch 0, seed 0 where epoch 0, seed 1 is due"),
+        (lambda table: table.take([1, 0, *range(2, 20)]), "a row of epoch 0, seed 1 where epoch 0, seed 0"),
+        (lambda table: table.drop_columns(["kl"]), "column kl is missing"),
+        (lambda table: table.drop_columns(["greedy_return"]), "column greedy_return is missing"),
+        (
+            lambda table: table.append_column("alpha_q50", table["kl"]),
+            "column alpha_q50 does not belong to it",
+        ),
+        (
+            lambda table: table.set_column(
+                table.column_names.index("kl"), "kl", pa.nulls(len(table), pa.float32())
+            ),
+            "column kl has values where none are due, or lacks some",
+        ),
+        (
+            lambda table: table.set_column(
+                table.column_names.index("episodes"), "episodes", table["episodes"].cast(pa.float64())
+            ),
+            "column episodes is of the type double",
+        ),
+    ],
+)
+def test_rows_that_have_a_checksum_and_are_wrong_are_found(
+    folder: StudyFolder, change: Any, said: str
+) -> None:
+    republish(folder, change(read_cell(folder.cell_file(CELL))))
+    assert folder.state(CELL) == "finished"  # as far as checksums go
+    (found,) = bad(verify([CELL], folder, rerun=()))
+    assert said in found
+    assert said in check_rerun(CELL, folder, 1).message
+    with pytest.raises(DamagedFileError, match=re.escape(said)):  # what report and ledger end in
+        Outcomes.read(folder, [CELL])
+
+
+def test_a_file_that_does_not_say_how_it_was_made_is_found(folder: StudyFolder) -> None:
+    path = folder.cell_file(CELL)
+    about = store.read_metadata(path)
+    del about["sessions"]
+    folder.publish({path: store.parquet_bytes(read_cell(path), json.dumps(about))})
+    assert "sessions is missing" in bad(verify([CELL], folder, rerun=[CELL]))[0]
+
+
+def test_policies_of_another_family_are_found(folder: StudyFolder, tmp_path: Path) -> None:
+    policies, _ = folder.policy_files(CELL)
+    other = small_cell(family="logit-normal", epochs=10, keeps_policies=True)
+    save_policies(tmp_path / "other", Trainer(other.config))
+    folder.publish({policies: (tmp_path / "other").read_bytes()})
+    (found,) = bad(verify([CELL], folder, rerun=()))
+    assert (
+        "policies of another configuration (policy.family is 'logit-normal' instead of 'gaussian')" in found
+    )
+    folder.publish({policies: b"no policies"})
+    (found,) = bad(verify([CELL], folder, rerun=()))
+    assert f"{policies.name} is damaged" in found
+
+
+def test_returns_of_the_policies_are_looked_into(folder: StudyFolder) -> None:
+    path = folder.policy_files(CELL)[1]
+    about, table = json.dumps(store.read_metadata(path)), read_cell(path)
+    for wrong, said in (
+        (table.slice(1), "79 rows that are not mean, median, mode, sample × 2 seeds × 10 episodes"),
+        (table.drop_columns(["length"]), "column length is missing"),
+    ):
+        folder.publish({path: store.parquet_bytes(wrong, about)})
+        (found,) = bad(verify([CELL], folder, rerun=()))
+        assert said in found
+        with pytest.raises(DamagedFileError, match=re.escape(said)):
+            Outcomes.read(folder, [CELL])
+
+
+@pytest.mark.parametrize("command", ["report", "ledger"])
+def test_a_damaged_cell_ends_a_command_in_one_line(command: str, tmp_path: Path) -> None:
+    (cell,) = select(["standard-hopper-ppo-beta"])
+    folder = folder_in(tmp_path)
+    write_cells(folder, [cell])
+    path = folder.cell_file(cell)
+    about = json.dumps(store.read_metadata(path))
+    folder.publish({path: store.parquet_bytes(read_cell(path).drop_columns(["return_mean"]), about)})
+    words = ["study", command, "--results", folder.results, "--work", folder.work]
+    code, out, err = run(*words, *(["--out", tmp_path / "report.html"] if command == "report" else []))
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert "column return_mean is missing" in err
+    assert "git checkout -- " in err
+
+
+@pytest.mark.parametrize("command", ["report", "ledger", "verify"])
+def test_a_folder_that_is_not_there_is_an_error(command: str, tmp_path: Path) -> None:
+    code, _, err = run("study", command, "--results", tmp_path / "missing")
+    assert code == 2
+    assert "name it with --results" in err
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("column", ["return_mean", "greedy_return", "episodes", "kl"])

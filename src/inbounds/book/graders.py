@@ -78,7 +78,7 @@ def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verd
     name = getattr(function, "__name__", "your function")
     for case in cases:
         try:
-            answer = function(*case.arguments)
+            answer = detached(function(*case.arguments))
         except Exception as error:
             return Verdict(name, False, f"it raised {type(error).__name__}: {error}")
         if answer is ... or answer is None or answer is NotImplemented:
@@ -163,6 +163,18 @@ def judge_diagnosis(
         hint = (stopped_before if stopped else lets_pass).format(answer=answer)
         return Verdict("diagnosis", False, f"{noun} {name}: {hint}")
     return Verdict("diagnosis", True, "every bug is stopped by the check that you named")
+
+
+def detached(answer: Any) -> Any:
+    """An answer without autograd's graph: NumPy refuses a tensor that has one, and no value depends on it.
+
+    Example:
+        >>> detached((torch.ones(1, requires_grad=True), 2.0))
+        (tensor([1.]), 2.0)
+    """
+    if isinstance(answer, torch.Tensor):
+        return answer.detach()
+    return type(answer)(map(detached, answer)) if type(answer) in (list, tuple) else answer
 
 
 def agrees(answer: Any, expected: Any, rtol: float) -> bool:

@@ -24,7 +24,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Normal, kl_divergence
 
-from inbounds.book.graders import Case, Verdict, judge, judge_by_checks, judge_diagnosis
+from inbounds.book.graders import Case, Verdict, detached, judge, judge_by_checks, judge_diagnosis
 
 __all__ = ["CHECKS", "diagnosis", "linear_fisher_product", "trpo_step"]
 
@@ -244,7 +244,7 @@ def linear_fisher_product(function: Callable[..., Any]) -> Verdict:
         answer = function(*arguments)
         if answer is ... or answer is None:
             return answer
-        weight, log_scale = answer
+        weight, log_scale = detached(tuple(answer))
         return _join(weight, log_scale)
 
     joined.__name__ = getattr(function, "__name__", "linear_fisher_product")

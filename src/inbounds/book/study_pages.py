@@ -40,11 +40,7 @@ def shipped(root: Path = ROOT) -> Outcomes:
     Raises:
         FileNotFoundError: there are no results: the package was installed without its source tree.
     """
-    if not (root / "results" / "PROTOCOL.md").is_file():
-        raise FileNotFoundError(
-            "the study is not part of the installed package: clone the project, and `pip install -e .` in it"
-        )
-    return Outcomes.read(StudyFolder(root / "results", root / "runs" / "study"))
+    return Outcomes.read(StudyFolder.shipped(root))
 
 
 def state(outcomes: Outcomes) -> Shown:

@@ -8,6 +8,8 @@ The browser's own controls stand in a band below the picture, not on it: they ne
 them. Films that are shown together open with the moment in which they differ most.
 """
 
+from __future__ import annotations
+
 import base64
 import html
 import itertools
@@ -15,12 +17,15 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inbounds.robots.rendering import Film
+from inbounds.learning.storage.files import write_whole
+
+if TYPE_CHECKING:  # what encodes a film needs no MuJoCo
+    from inbounds.robots.rendering import Film
 
 MAX_SECONDS = 5.0
 MAX_BYTES = 120_000
@@ -171,6 +176,7 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
     Raises:
         ValueError: odd width or height.
         RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
+        OSError: it could not be written, as on a full disk; nothing is left of it.
 
     Example:
         >>> import tempfile
@@ -181,7 +187,7 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
         True
     """
     path = Path(path)
-    path.write_bytes(_encode(film, _FILE_QUANTISER))
+    write_whole(path, _encode(film, _FILE_QUANTISER))
     return path
 
 

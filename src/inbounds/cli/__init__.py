@@ -1,4 +1,4 @@
-"""The command `inbounds`: train, watch, bench, study.
+"""The command `inbounds`: train, watch, bench, study; `inbounds --version` says which one it is.
 
 >>> main(["watch", "no/such/run"])  # what to do instead goes to standard error
 1
@@ -6,9 +6,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
+
+import inbounds
+from inbounds.cli.errors import CommandError, is_unread
 
 __all__ = ["main"]
 
@@ -46,19 +50,26 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     args = list(sys.argv[1:] if args is None else args)
     try:
-        return _run(args)
+        code = _run(args)
+        sys.stdout.flush()  # here, where it can still be told that nobody reads it
+        return code
     except KeyboardInterrupt:
         print("\ninbounds: interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # whoever read the output (`| head`) has had enough
+    except (BrokenPipeError, SystemExit) as error:  # whoever read the output (`| head`) has had enough
+        if not is_unread(error):
+            raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python's own last flush
         return 141
 
 
 def _run(args: list[str]) -> int:
+    if args == ["--version"]:
+        print(f"inbounds {inbounds.__version__}")
+        return 0
     # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
     from inbounds.cli import benchmark, options, training, watching
-    from inbounds.cli.errors import CommandError
+    from inbounds.headless import BackendError
 
     try:
         if args[:1] == ["bench"] and benchmark.find_root():
@@ -74,6 +85,8 @@ def _run(args: list[str]) -> int:
             return watching.run(command)
         return benchmark.run([])
     except SystemExit as exit_:  # tyro has written its help, or what is wrong
+        if is_unread(exit_):
+            raise
         if exit_.code == 0:
             examples = EXAMPLES.get(next(iter(args), ""), "\n".join(EXAMPLES.values()))
             print(f"\nexamples:\n{examples}")
@@ -81,3 +94,14 @@ def _run(args: list[str]) -> int:
     except CommandError as error:
         print(f"inbounds: {error}", file=sys.stderr)
         return error.exit_code
+    except BackendError as error:
+        print(f"inbounds: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        print(
+            f"inbounds: a name is too long for the disk ({error.filename}): choose a shorter one",
+            file=sys.stderr,
+        )
+        return 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import traceback
+
 
 class CommandError(Exception):
     """Ends a command with a message and an exit code; the message says what to do."""
@@ -9,3 +11,25 @@ class CommandError(Exception):
     def __init__(self, message: str, exit_code: int = 1) -> None:
         super().__init__(message)
         self.exit_code = exit_code
+
+
+def is_ours(error: BaseException) -> bool:
+    """Whether this package raised an error, and not what it called: an environment's author needs the traceback.
+
+    Example:
+        >>> from inbounds.cli.options import parse_seeds
+        >>> try:
+        ...     parse_seeds("ten")
+        ... except ValueError as error:
+        ...     is_ours(error)
+        True
+    """
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    return bool(frames) and frames[-1].f_globals.get("__name__", "").split(".")[0] == "inbounds"
+
+
+def is_unread(error: BaseException) -> bool:
+    """Whether an error means that nobody reads the output any more (`| head`); Rich makes a SystemExit of it."""
+    return isinstance(error, BrokenPipeError) or (
+        isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError)
+    )

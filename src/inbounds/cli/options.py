@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,8 @@ from tyro.constructors import PrimitiveConstructorSpec
 from inbounds.learning import PolicyConfig, TrainConfig, preset
 
 DESCRIPTION = (
-    "Policy gradients on bounded action spaces: train policies over seeds in lockstep, film them, measure."
+    "Policy gradients on bounded action spaces: train policies over seeds in lockstep, film them, measure. "
+    "inbounds --version says which version this is."
 )
 
 # Written out, because a type must be; a test compares them with inbounds.learning's tables.
@@ -66,6 +68,16 @@ def format_seeds(seeds: Sequence[int]) -> str:
     if len(seeds) > 1 and seeds == tuple(range(seeds[0], seeds[-1] + 1)):
         return f"{seeds[0]}-{seeds[-1]}"
     return ",".join(map(str, seeds)) + ("," if len(seeds) == 1 else "")
+
+
+def quoted(path: Path) -> str:
+    """Return a path as a shell takes it back: what has a space is quoted.
+
+    Example:
+        >>> quoted(Path("my runs/hopper")), quoted(Path("runs/hopper"))
+        ("'my runs/hopper'", 'runs/hopper')
+    """
+    return shlex.quote(str(path))
 
 
 _SEEDS: PrimitiveConstructorSpec[tuple[int, ...]] = PrimitiveConstructorSpec(
@@ -140,6 +152,9 @@ class Watch:
     """Pixels; even."""
     out: Path | None = None
     """The file; by default RUN/GREEDY-seedS.mp4."""
+    trust: bool = False
+    """Import the module that the run names for its environment (my_module:Env-v0), which executes that module's code:
+    only where you know who wrote the run and the module."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.text import Text
 
+from inbounds.cli.errors import is_unread
 from inbounds.learning import Trainer
 from inbounds.learning.training import Record
 
@@ -39,6 +40,8 @@ class TrainingProgress:
 
     def __init__(self, epochs: int, console: Console | None = None) -> None:
         self.epochs = epochs
+        self.unread = False
+        """Whether what was written last found no reader."""
         # In a notebook too, plain lines: they can be read in the stored file.
         self.console = console or Console(highlight=False, force_jupyter=False)
         self._returns: Any = None  # [S], of each seed the last one known
@@ -76,7 +79,12 @@ class TrainingProgress:
 
     def say(self, text: str) -> None:
         """Write a line, above the bar."""
-        self.console.print(text, markup=False, soft_wrap=True)
+        try:
+            self.console.print(text, markup=False, soft_wrap=True)
+        except (BrokenPipeError, SystemExit) as error:
+            if not is_unread(error):
+                raise
+            self.unread = True  # in mid-epoch, perhaps: whoever asks stops at its end
 
     def _picture(self, text: str, done: int) -> Group:
         """The numbers, and a bar below them that is as wide as the terminal."""

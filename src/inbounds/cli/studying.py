@@ -12,6 +12,7 @@ import tyro
 from rich.console import Console
 from tyro.conf import Positional, arg, subcommand
 
+from inbounds.learning.storage.files import DamagedFileError
 from inbounds.study.cell_run import StudyError
 from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
@@ -151,7 +152,7 @@ def study(args: Sequence[str]) -> int:
             prog="inbounds study",
             description=description,
         )
-        if isinstance(command, Ledger | Verify) and not command.results.is_dir():
+        if isinstance(command, Ledger | Verify | Report) and not command.results.is_dir():
             raise ValueError(_no_folder(command.results))
         if isinstance(command, Ledger):
             return _ledger(command, console)
@@ -163,6 +164,8 @@ def study(args: Sequence[str]) -> int:
         if isinstance(command, Report):
             return _report(command, cells, console)
         return _verify(command, cells, console)
+    except DamagedFileError as error:
+        return _complain(str(error), 1)
     except ValueError as error:
         return _complain(str(error), 2)
     except StudyError as error:

@@ -13,10 +13,13 @@ from typing import Any
 
 import gymnasium
 
-from inbounds.cli.errors import CommandError
-from inbounds.cli.options import Train
+from inbounds import robots  # its names are imported on first use, and MuJoCo with them
+from inbounds.cli.errors import CommandError, is_ours
+from inbounds.cli.modules import find_modules_here, module_of
+from inbounds.cli.options import Train, quoted
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
+from inbounds.headless import BackendError
 from inbounds.learning import TrainConfig, Trainer, train
 from inbounds.learning.rollout import check_environments
 from inbounds.learning.storage import checkpoint
@@ -31,7 +34,6 @@ from inbounds.learning.storage.run_store import (
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, differences
 from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
-from inbounds.robots.rendering import is_drawable
 
 
 class Stop:
@@ -58,7 +60,11 @@ class Stop:
 
 
 class Stopped(Exception):  # noqa: N818 (no error)
-    """The wish was granted."""
+    """Training has stopped after an epoch, and everything is kept."""
+
+    def __init__(self, said: str, exit_code: int) -> None:
+        super().__init__(said)
+        self.exit_code = exit_code
 
 
 def run(command: Train) -> int:
@@ -69,25 +75,28 @@ def run(command: Train) -> int:
     """
     config, run_dir = command.train_config(), command.run_dir()
     _check_environment(config)
+    room = next(path for path in (run_dir, *run_dir.absolute().parents) if path.exists())
     with _claimed(run_dir):
-        return _Session(command, config, run_dir).run()
+        return _Session(command, config, run_dir, room).run()
 
 
 class _Session:
     """One process' part of a run: what it does after every epoch, and what it says when it ends."""
 
-    def __init__(self, command: Train, config: TrainConfig, run_dir: Path) -> None:
+    def __init__(self, command: Train, config: TrainConfig, run_dir: Path, room: Path) -> None:
         self.done = self.kept = _epochs_kept(run_dir, config)
         # A run that has more epochs than are asked for keeps them, and goes on saying so.
         self.config = dataclasses.replace(config, epochs=max(config.epochs, self.done))
         self.run_dir, self.stop = run_dir, Stop()
+        self.room = room  # the run directory, or the folder that it would be made in
         self.wants_tensorboard = command.tensorboard
 
     def run(self) -> int:
         """Train to the end, or say how far it came and what is kept."""
         config, start = self.config, self.done
         with contextlib.ExitStack() as stack:
-            watchers: list[Any] = [stack.enter_context(progress := TrainingProgress(config.epochs))]
+            progress = self.progress = stack.enter_context(TrainingProgress(config.epochs))
+            watchers: list[Any] = [progress]
             if self.wants_tensorboard:
                 board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
@@ -103,15 +112,19 @@ class _Session:
                     self._save(trainer)
                     if self.wants_tensorboard and not self.done > start:
                         board(trainer, trainer.records[-1])
-            except Stopped:
-                raise CommandError(self._kept("stopped"), 128 + (self.stop.signal or 0)) from None
+            except Stopped as stopped:
+                raise CommandError(self._kept(str(stopped)), stopped.exit_code) from None
             except KeyboardInterrupt:
                 raise CommandError(self._kept("stopped in mid-epoch"), 130) from None
             except ValueError as error:
-                if self.done > start:
-                    raise  # no fault of the user's: nothing was wrong with the first epoch
+                if self.done > start or not is_ours(error):
+                    raise  # no fault of the command's: nothing was wrong with the first epoch
                 raise CommandError(str(error), 2) from error
-            except (OSError, RuntimeError) as error:
+            except BrokenPipeError as error:  # not of the output, which `progress` sees to
+                raise RuntimeError("a process that the environment talks to has gone") from error
+            except OSError as error:
+                if not (is_ours(error) or is_disk_full(error)):
+                    raise  # the environment's own
                 raise self._unwritten(error) from error
         return self._conclude(trainer, start)
 
@@ -122,9 +135,11 @@ class _Session:
         if self.done % self.config.checkpoint_every == 0 or self.done == self.config.epochs:
             self.kept = self.done  # `train` has just written the checkpoint
             save_run(self.run_dir, trainer)
-        if self.stop.signal is not None:
+        if self.stop.signal is not None or self.progress.unread:
             self._save(trainer)
-            raise Stopped
+            if self.stop.signal is not None:
+                raise Stopped("stopped", 128 + self.stop.signal)
+            raise Stopped("stopped, because nobody reads the output any more", 141)
 
     def _save(self, trainer: Trainer) -> None:
         """Have all files say the same, also where `train` leaves no checkpoint or was killed between two files."""
@@ -135,9 +150,16 @@ class _Session:
 
     def _conclude(self, trainer: Trainer, start: int) -> int:
         if trainer.diverged.all():
+            slower = "train with a smaller --algorithm.learning-rate in another --out"
+            mended = (
+                "mend the environment, which has returned an observation or a reward that is no finite number"
+            )
+            advice = mended if trainer.fed_nonsense.any() else slower
+            if not self.done > start:  # the run of another day, which did not note why
+                advice = f"{slower}; or, if it returned an observation or a reward that is NaN, mend the environment"
             raise CommandError(
-                f"all seeds diverged, the last in epoch {len(trainer.records) - 1}; the curves are in {self.run_dir}. "
-                "Train with a smaller --algorithm.learning-rate in another --out"
+                f"all seeds diverged, the last in epoch {len(trainer.records) - 1}; the curves are in "
+                f"{quoted(self.run_dir)}. What helps: {advice}"
             )
         done = (
             f"done: {self.done} epochs"
@@ -145,33 +167,34 @@ class _Session:
             else f"there was nothing to do: {start} epochs are done"
         )
         print(f"{done}. {self.run_dir} has {CURVES_FILE}, {POLICIES_FILE} and {CHECKPOINT_FILE}")
-        if is_drawable(trainer.envs):
-            print(f"film it: inbounds watch {self.run_dir}")
+        if robots.is_drawable(trainer.envs):
+            trust = " --trust" if module_of(self.config.env) else ""
+            print(f"film it: inbounds watch {quoted(self.run_dir)}{trust}")
         return 0
 
     def _kept(self, what: str) -> str:
         if not self.kept:
             return f"{what} before the first checkpoint: nothing is kept"
-        return f"{what}. {self.run_dir} keeps {self.kept} epochs; the same command goes on from there"
+        return f"{what}. {quoted(self.run_dir)} keeps {self.kept} epochs; the same command goes on from there"
 
-    def _unwritten(self, error: OSError | RuntimeError) -> BaseException:
-        """What to raise: a line about the disk, or the error itself if it is about something else."""
+    def _unwritten(self, error: OSError) -> CommandError:
         if is_disk_full(error):
-            return CommandError(
-                f"the disk is full. {self._kept('Training stopped')}, once there is room (df -h {self.run_dir})"
-            )
-        if isinstance(error, OSError) and not isinstance(error, BrokenPipeError):
-            return CommandError(f"{self.run_dir} cannot be written: {error}. Choose another --out")
-        return error
+            room = f"Make room first (df -h {quoted(self.room)})"
+            return CommandError(f"the disk is full. {self._kept('Training stopped')}. {room}")
+        return CommandError(f"{self.run_dir} cannot be written: {error}. Choose another --out")
 
 
 def _check_environment(config: TrainConfig) -> None:
     """Raise unless the environment can be made; say what to ask for instead."""
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
     try:
+        if module_of(config.env):
+            find_modules_here()
         envs = make_environments(config, 1)
         check_environments(envs, 1)
         envs.close()
+    except BackendError:
+        raise
     except gymnasium.error.UnregisteredEnv as error:
         close = difflib.get_close_matches(config.env, [*TASK_NAMES, *gymnasium.registry], n=1)
         meant = f"did you mean {close[0]}? " if close else ""
@@ -181,6 +204,8 @@ def _check_environment(config: TrainConfig) -> None:
             2,
         ) from error
     except (gymnasium.error.Error, ImportError, ValueError) as error:
+        if isinstance(error, ValueError) and not is_ours(error):
+            raise  # the environment's own
         raise CommandError(f"{config.env} will not do: {error}. {tasks}", 2) from error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,16 @@ import numpy as np
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from numpy.typing import NDArray
 
+from inbounds import robots  # its names are imported on first use, and MuJoCo with them
 from inbounds.book.videos import require_encoder, write_film
-from inbounds.cli.errors import CommandError
-from inbounds.cli.options import Watch
+from inbounds.cli.errors import CommandError, is_ours
+from inbounds.cli.modules import find_modules_here, module_of
+from inbounds.cli.options import Watch, quoted
+from inbounds.headless import BackendError
 from inbounds.learning.storage.files import is_disk_full
 from inbounds.learning.storage.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.storage.trained_policy import TrainedPolicy
 from inbounds.learning.training import make_environments
-from inbounds.robots import record
 
 
 def run(command: Watch) -> int:
@@ -31,12 +34,7 @@ def run(command: Watch) -> int:
     path = command.out or (
         (command.run if command.run.is_dir() else command.run.parent) / f"{greedy}-seed{policy.seed}.mp4"
     )
-    if command.seconds <= 0 or min(command.width, command.height) < 2:
-        raise CommandError("--seconds, --width and --height must be positive", 2)
-    if command.width % 2 or command.height % 2:
-        raise CommandError("--width and --height must be even: the film's colours come in squares of four", 2)
-    if not path.parent.is_dir():
-        raise CommandError(f"there is no folder {path.parent}: make it first (mkdir -p {path.parent})")
+    _check(command, policy.config.env, path)
     rng = np.random.default_rng(command.env_seed)
 
     def act(obs: NDArray[Any]) -> NDArray[Any]:
@@ -45,7 +43,7 @@ def run(command: Watch) -> int:
     try:
         require_encoder()  # before the film is made, not after
         envs = RecordEpisodeStatistics(make_environments(policy.config, 1))
-        film = record(
+        film = robots.record(
             envs,
             act,
             seconds=command.seconds,
@@ -53,8 +51,17 @@ def run(command: Watch) -> int:
             width=command.width,
             height=command.height,
         )
+    except BackendError:
+        raise
+    except (gymnasium.error.Error, ImportError) as error:
+        raise CommandError(f"{policy.config.env} cannot be made here: {error}") from error
+    except (ValueError, TypeError, RuntimeError) as error:
+        if not is_ours(error):
+            raise  # the environment's own
+        raise CommandError(str(error)) from error
+    try:
         write_film(path, film)
-    except (ValueError, TypeError, RuntimeError, gymnasium.error.Error) as error:
+    except RuntimeError as error:  # of the encoder
         raise CommandError(str(error)) from error
     except OSError as error:
         room = " Free some space on the disk and repeat the command." if is_disk_full(error) else ""
@@ -70,13 +77,35 @@ def run(command: Watch) -> int:
     return 0
 
 
+def _check(command: Watch, env: str, path: Path) -> None:
+    """Raise unless the film can be made as it is asked for."""
+    if not 0 < command.seconds < math.inf or min(command.width, command.height) < 2:
+        raise CommandError("--seconds, --width and --height must be positive numbers", 2)
+    if command.width % 2 or command.height % 2:
+        raise CommandError("--width and --height must be even: the film's colours come in squares of four", 2)
+    if command.env_seed < 0:
+        raise CommandError("--env-seed must be 0 or more", 2)
+    if not path.parent.is_dir():
+        raise CommandError(
+            f"there is no folder {path.parent}: make it first (mkdir -p {quoted(path.parent)})"
+        )
+    if module := module_of(env):
+        if not command.trust:
+            raise CommandError(
+                f"the run names {env} as its environment: to film it, Python imports the module {module}, and "
+                "executes whatever is in it. If you know who wrote the run and the module, allow it: "
+                f"inbounds watch {quoted(command.run)} --trust"
+            )
+        find_modules_here()
+
+
 def _choose(command: Watch) -> TrainedPolicy:
     """The policy that the command means."""
     try:
         policies = load_policies(command.run)
     except FileNotFoundError:
         here = Path("runs") if command.run.parent == Path() else command.run.parent
-        found = sorted(str(path.parent) for path in here.glob(f"*/{POLICIES_FILE}"))
+        found = sorted(quoted(path.parent) for path in here.glob(f"*/{POLICIES_FILE}"))
         instead = f"choose one of {', '.join(found)}" if found else "train one first (inbounds train --help)"
         raise CommandError(f"there is no trained run in {command.run}: {instead}") from None
     except ValueError as error:  # damaged, or of another version

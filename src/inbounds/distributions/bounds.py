@@ -26,6 +26,7 @@ __all__ = [
     "SigmoidMapped",
     "TensorLike",
     "as_parameters",
+    "require_bounds",
     "require_equal_bounds",
 ]
 
@@ -64,7 +65,8 @@ class BoundedDistribution(Distribution):
 
     Args:
         validate_args: check parameters and values (None: as `torch.distributions` is set, on by default). Inside
-            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor.
+            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor. Code compiled by
+            `torch.compile` checks nothing.
         **parameters: `[...]` each; numbers, tensors or arrays that broadcast together, `low` and `high` among them.
 
     Raises:
@@ -83,6 +85,10 @@ class BoundedDistribution(Distribution):
     def __init__(self, *, validate_args: bool | None = None, **parameters: TensorLike) -> None:
         for name, value in as_parameters(**parameters).items():
             setattr(self, name, value)
+        if torch.compiler.is_compiling():
+            validate_args = (
+                False  # compiled code cannot branch on numbers; torch switches off its own checks, too
+            )
         if validate_args if validate_args is not None else self._validate_args:
             _check_bounds(type(self).__name__, self.low, self.high)
         super().__init__(self.low.shape, validate_args=validate_args)
@@ -211,7 +217,8 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
         ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
     """
     given = {
-        name: torch.tensor(value) if isinstance(value, np.ndarray | np.generic) else value
+        # A tuple of types: torch.compile cannot trace a union.
+        name: torch.tensor(value) if isinstance(value, (np.ndarray, np.generic)) else value
         for name, value in parameters.items()
     }
     own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]
@@ -234,8 +241,31 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
     return dict(zip(given, tensors, strict=True))
 
 
+def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
+    """Return the two bounds as tensors of torch's default type and one shape, checked whatever torch's settings are.
+
+    Args:
+        low: `[...]` lower bounds.
+        high: `[...]` upper bounds.
+
+    Raises:
+        ValueError: some are not finite or not in order, or no floating-point number lies between them.
+
+    Example:
+        >>> require_bounds(-1.0, np.inf)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. An unbounded ...
+    """
+    tensors = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in (low, high))
+    low, high = as_parameters(low=next(tensors), high=next(tensors)).values()
+    _check_bounds("action box", low, high)
+    return low, high
+
+
 def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None:
     """Raise unless p and q live on the same interval: otherwise their KL divergence is infinite or meaningless.
+
+    Not in compiled code (`torch.compile`), where nothing can be checked.
 
     Args:
         p: a law with bounds.
@@ -244,6 +274,8 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
     Raises:
         ValueError: the bounds differ anywhere.
     """
+    if torch.compiler.is_compiling():  # which cannot branch on numbers
+        return
     if bool(((p.low != q.low) | (p.high != q.high)).any()):
         raise ValueError(
             "the KL divergence needs equal bounds, but "

@@ -157,9 +157,13 @@ class ClippedNormal(BoundedDistribution):
 
     @property
     def mean(self) -> Tensor:
-        """`[...]` mean of the clipped value, in closed form."""
-        pivot, first, _ = self._moments()
-        return (self.loc.double() + self.scale.double() * (pivot + first)).to(self.low.dtype)
+        """`[...]` mean of the clipped value, in closed form, measured from the median: always within the bounds."""
+        parts = self._parts()
+        loc, scale, low, high = (x.double() for x in (self.loc, self.scale, self.low, self.high))
+        pivot = torch.clamp(loc, low, high).detach()  # on paper, the mean does not depend on it
+        on_bounds = (low - pivot) * parts.log_low.exp() + (high - pivot) * parts.log_high.exp()
+        between = scale * parts.m1 + (loc - pivot) * parts.m0
+        return torch.clamp((pivot + on_bounds + between).to(self.low.dtype), self.low, self.high)
 
     @property
     def variance(self) -> Tensor:

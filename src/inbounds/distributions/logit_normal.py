@@ -155,8 +155,8 @@ class LogitNormal(SigmoidMapped):
 
     @property
     def mean(self) -> Tensor:
-        """`[...]` mean of the value, by quadrature."""
-        return self.low + self.width * self._expect(torch.sigmoid)
+        """`[...]` mean of the value, by quadrature; within the bounds, which rounding could leave by a last bit."""
+        return torch.clamp(self.low + self.width * self._expect(torch.sigmoid), self.low, self.high)
 
     @property
     def variance(self) -> Tensor:
@@ -210,18 +210,18 @@ class LogitNormal(SigmoidMapped):
     def _expect(self, function: Any) -> Tensor:
         return expectation(function, self.loc, self.scale, graded_trapezoid(self.loc, self.scale))
 
-    @torch.no_grad()
     def _mode_root(self) -> Tensor:
         """Return the root on μ's side of zero, outside the graph.
 
         For μ ≥ 0 and z ≥ 0, z − μ − σ² tanh(z/2) is convex, not positive at μ and positive at μ + σ²: Newton's method
         from the right end falls monotonically to the one root. The clamp to that bracket only absorbs rounding.
         """
-        loc, variance = self.loc.abs(), self.scale.square()
-        root = loc + variance
-        for _ in range(_NEWTON_STEPS):
-            root = torch.clamp(_newton_step(root, loc, self.scale), loc, loc + variance)
-        return torch.where(self.loc < 0, -root, root)
+        with torch.no_grad():  # as a decorator, torch.compile could not trace it
+            loc, variance = self.loc.abs(), self.scale.square()
+            root = loc + variance
+            for _ in range(_NEWTON_STEPS):
+                root = torch.clamp(_newton_step(root, loc, self.scale), loc, loc + variance)
+            return torch.where(self.loc < 0, -root, root)
 
 
 def _newton_step(z: Tensor, loc: Tensor, scale: Tensor) -> Tensor:

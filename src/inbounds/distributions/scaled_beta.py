@@ -182,8 +182,9 @@ class ScaledBeta(SigmoidMapped):
 
     @property
     def mean(self) -> Tensor:
-        """`[...]` mean, low + width · α/(α + β)."""
-        return self.low + self.width * self.concentration1 / (self.concentration1 + self.concentration0)
+        """`[...]` mean, low + width · α/(α + β); within the bounds, which rounding could leave by a last bit."""
+        mean = self.low + self.width * self.concentration1 / (self.concentration1 + self.concentration0)
+        return torch.clamp(mean, self.low, self.high)
 
     @property
     def variance(self) -> Tensor:

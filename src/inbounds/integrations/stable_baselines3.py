@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from inbounds.distributions import LogitNormal
+from inbounds.distributions.bounds import require_bounds
+from inbounds.distributions.boxes import require_box
 
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
@@ -41,6 +43,9 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         low: `[A]` lower bounds of the action, in its own units.
         high: `[A]` upper bounds.
 
+    Raises:
+        ValueError: some bounds are not finite, not in order, or so close that no number is between them.
+
     Example:
         >>> law = LogitNormalDistribution(np.array([0.0, -2.0]), np.array([8.0, 1.0]))
         >>> _ = law.proba_distribution(torch.zeros(1, 2), torch.zeros(2))
@@ -54,7 +59,7 @@ class LogitNormalDistribution(DiagGaussianDistribution):
 
     def __init__(self, low: NDArray[Any], high: NDArray[Any]) -> None:
         super().__init__(len(low))
-        self.low, self.high = (torch.as_tensor(np.array(bound)) for bound in (low, high))
+        self.low, self.high = require_bounds(low, high)
 
     def proba_distribution(self, mean_actions: Tensor, log_std: Tensor) -> LogitNormalDistribution:
         """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them."""
@@ -94,7 +99,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
             0.42 of half the range. Generalised state-dependent exploration (`use_sde`) is not for it.
 
     Raises:
-        ValueError: another action space, or `use_sde`.
+        ValueError: another action space (the message names the wrapper that makes this one of it), or `use_sde`.
 
     Example:
         >>> import gymnasium
@@ -112,15 +117,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
         lr_schedule: Callable[[float], float],
         **options: Any,
     ) -> None:
-        if (
-            not isinstance(action_space, gymnasium.spaces.Box)
-            or len(action_space.shape) != 1
-            or not action_space.is_bounded()
-        ):
-            raise ValueError(
-                f"LogitNormalPolicy needs a bounded, one-dimensional Box of actions, got {action_space}: wrap the "
-                "environment (gymnasium.wrappers.RescaleAction, FlattenAction) so that it has one"
-            )
+        require_box(action_space)
         if options.get("use_sde"):
             raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
         super().__init__(observation_space, action_space, lr_schedule, **options)

@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from torch.distributions import Distribution, constraints, kl_divergence, register_kl
 
 from inbounds.distributions import LogitNormal, ScaledBeta
-from inbounds.distributions.bounds import TensorLike
+from inbounds.distributions.bounds import TensorLike, require_bounds
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
@@ -112,7 +112,7 @@ def bounded_actor(
         And the same followed by the module that writes `action` `[..., A]`: let it act.
 
     Raises:
-        ValueError: another law.
+        ValueError: another law, or bounds that are not finite, not in order, or too close for a number between them.
 
     Example:
         >>> from tensordict import TensorDict
@@ -125,7 +125,7 @@ def bounded_actor(
     """
     if law not in PARAMETERS:
         raise ValueError(f"bounded_actor knows the laws LogitNormal and ScaledBeta, not {law}")
-    low, high = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in (low, high))
+    low, high = require_bounds(low, high)  # once: TorchRL switches off every later check
     names = PARAMETERS[law]
 
     def latents(**parameters: Tensor) -> Latents:

@@ -18,6 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from torch import Tensor
 
+from inbounds.distributions.boxes import require_box
 from inbounds.learning.advantages import gae
 from inbounds.learning.families.family import Parameters
 from inbounds.learning.families.policy import SATURATION_MARGIN, ActionMode
@@ -245,8 +246,8 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         num_seeds: how many there must be.
 
     Raises:
-        ValueError: another number, another autoreset mode, observations that are no Box, or actions that are no
-            bounded one-dimensional one.
+        ValueError: another number, another autoreset mode, observations that are no Box, or actions that `require_box`
+            refuses.
     """
     if envs.num_envs != num_seeds:
         raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
@@ -261,14 +262,4 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
             f"observations must be a Box, got {envs.single_observation_space}: wrap the environment "
             "(gymnasium.wrappers.FlattenObservation) so that they are"
         )
-    box = envs.single_action_space
-    if isinstance(box, gymnasium.spaces.Box) and not np.issubdtype(box.dtype, np.floating):
-        raise ValueError(
-            f"actions must be real numbers, got {box}, which would cut off what follows the point: wrap the "
-            "environment (gymnasium.wrappers.TransformAction) so that it rounds, and offers floating-point numbers"
-        )
-    if not isinstance(box, gymnasium.spaces.Box) or len(box.shape) != 1 or not box.is_bounded():
-        raise ValueError(
-            f"actions must be a bounded, one-dimensional Box, got {box}: wrap the environment "
-            "(gymnasium.wrappers.RescaleAction, FlattenAction) so that they are"
-        )
+    require_box(envs.single_action_space)

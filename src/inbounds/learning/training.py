@@ -28,6 +28,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from numpy.typing import NDArray
 
 from inbounds import robots
+from inbounds.distributions.boxes import require_box
+from inbounds.headless import naming_the_backend
 from inbounds.learning.config import ALGORITHMS, TrainConfig
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
@@ -74,6 +76,7 @@ class Trainer:
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
         check_environments(self.envs, num_seeds)
         box: Any = self.envs.single_action_space
+        require_box(box)
         policy = Policy(config.policy, box.low, box.high)
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
@@ -88,6 +91,8 @@ class Trainer:
         """What the last epoch learned from."""
         self.records: list[Record] = []
         self.diverged = np.zeros(num_seeds, np.bool_)
+        self.fed_nonsense = np.zeros(num_seeds, np.bool_)
+        """`[S]` which seeds have diverged in this process because of an observation or a reward that was not finite."""
 
     def epoch(self) -> Record:
         """Collect one rollout, do one update, and return the record, which also joins `records`."""
@@ -115,7 +120,11 @@ class Trainer:
     def _mark_diverged(self, rollout: Rollout) -> None:
         """Mark, and warn of, the seeds whose weights have just ceased to be finite; say where that came from."""
         now = ~self.networks.finite().numpy()
-        received = (rollout.obs.isfinite().all(2) & rollout.reward.isfinite()).all(1).numpy()
+        finite = rollout.obs.isfinite().all(2) & rollout.reward.isfinite() & rollout.bootstrap.isfinite()
+        received = finite.all(
+            1
+        ).numpy()  # [S]; the bootstrap has seen the last observations of rollout and episodes
+        self.fed_nonsense |= now & ~self.diverged & ~received
         for new, advice in (
             (now & ~self.diverged & received, "train with a smaller learning_rate"),
             (
@@ -263,9 +272,10 @@ def make_environments(config: TrainConfig, num_envs: int) -> Environments:
     """
     if config.env.removeprefix("inbounds/") in TASK_NAMES:
         return robots.make(config.env, num_envs, action_mode=config.action_mode)
-    return SyncVectorEnv(
-        [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
-    )
+    with naming_the_backend():  # Gymnasium has robots, too
+        return SyncVectorEnv(
+            [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
+        )
 
 
 def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:

@@ -3,15 +3,15 @@
 Names are imported on first use: what steps no robots, such as a policy that is loaded to act, need not load MuJoCo.
 """
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from inbounds.headless import naming_the_backend
 from inbounds.robots.registration import NAMESPACE
 
 if TYPE_CHECKING:
     from inbounds.robots.messages import MujocoWarning
-    from inbounds.robots.rendering import Camera, Film, RobotRenderer, record
+    from inbounds.robots.rendering import Camera, Film, RobotRenderer, is_drawable, record
     from inbounds.robots.vector_env import TASKS, RobotVectorEnv
 
 _HOME = {
@@ -21,10 +21,21 @@ _HOME = {
     "MujocoWarning": "messages",
     "RobotRenderer": "rendering",
     "RobotVectorEnv": "vector_env",
+    "is_drawable": "rendering",
     "record": "rendering",
 }
 
-__all__ = ["TASKS", "Camera", "Film", "MujocoWarning", "RobotRenderer", "RobotVectorEnv", "make", "record"]
+__all__ = [
+    "TASKS",
+    "Camera",
+    "Film",
+    "MujocoWarning",
+    "RobotRenderer",
+    "RobotVectorEnv",
+    "is_drawable",
+    "make",
+    "record",
+]
 
 
 def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
@@ -46,7 +57,8 @@ def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
         >>> envs.reset(seed=0)[0].shape
         (10, 11)
     """
-    from inbounds.robots import RobotVectorEnv
+    with naming_the_backend():
+        from inbounds.robots.vector_env import RobotVectorEnv
 
     return RobotVectorEnv(name.removeprefix(f"{NAMESPACE}/"), num_envs, **kwargs)
 
@@ -54,15 +66,8 @@ def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
+    with naming_the_backend():  # also because Python would take an AttributeError for a missing name
         value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-    except (
-        AttributeError
-    ) as error:  # what PyOpenGL raises in `import mujoco`; Python would report a missing name
-        raise ImportError(
-            f"MuJoCo cannot be imported with MUJOCO_GL={os.environ.get('MUJOCO_GL')} ({error}): unset it and start "
-            "Python again, or install the library that it names"
-        ) from error
     globals()[name] = value  # found directly from now on
     return value
 

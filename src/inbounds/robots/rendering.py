@@ -72,7 +72,7 @@ class RobotRenderer:
         camera: where the tracking camera stands; by default at the side, and above for a flat robot.
 
     Raises:
-        RuntimeError: there is no OpenGL to draw with; the message names the fix.
+        RuntimeError: there is no OpenGL to draw with, or not so many pixels; the message names the fix.
         TypeError: the environment has no MuJoCo simulation that can be reached.
         IndexError: there is no robot of that index.
 
@@ -97,6 +97,10 @@ class RobotRenderer:
         try:
             self._renderer = mujoco.Renderer(self._model, height, width)
         except Exception as error:  # each backend has exceptions of its own
+            if "framebuffer" in str(error).lower():
+                raise RuntimeError(
+                    f"OpenGL cannot draw {width} × {height} pixels here ({error}): choose a smaller width and height"
+                ) from error
             raise RuntimeError(
                 f"OpenGL could not be started ({error}). Without a display, set MUJOCO_GL=egl before Python starts; "
                 f"on Debian or Ubuntu: {headless.PACKAGES_HINT}"

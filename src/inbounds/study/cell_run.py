@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import time
 import warnings
 from collections.abc import Callable
@@ -81,8 +82,9 @@ def run_cell(
             return _CellRun(cell, folder, claim).run(stop, deadline)
     except (OSError, RuntimeError, safetensors.SafetensorError, pa.ArrowException) as error:
         if is_disk_full(error):
+            work = shlex.quote(str(folder.work))
             raise DiskFullError(
-                f"{cell.id}: the disk is full. The last checkpoint is kept; make room (df -h {folder.work}) "
+                f"{cell.id}: the disk is full. The last checkpoint is kept; make room (df -h {work}) "
                 "and run the study again"
             ) from error
         raise

@@ -9,8 +9,9 @@ Only whole cells are read: one that is not finished, damaged, or of another conf
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from inbounds.study import store
+from inbounds.study import contents, store
 from inbounds.study.grid import ARMS, Cell, study_cells
 from inbounds.study.statistics import carry_forward
 from inbounds.study.store import State, StudyFolder
@@ -169,6 +170,13 @@ def _by_way(episodes: pa.Table, column: str, seeds: int) -> dict[str, Floats]:
     }
 
 
+def _whole(path: Path, look: Callable[[Cell, pa.Table], str], cell: Cell) -> pa.Table:
+    table = store.read_cell(path)
+    if said := look(cell, table):
+        raise store.damaged(path, said)
+    return table
+
+
 @dataclass(frozen=True)
 class Outcomes:
     """What there is of a study.
@@ -194,17 +202,19 @@ class Outcomes:
         Args:
             folder: where the results are.
             cells: of the study; None is all of it.
+
+        Raises:
+            DamagedFileError: a file has its checksum and yet lacks columns or rows.
         """
         cells = study_cells() if cells is None else cells
         states = {cell.id: folder.state(cell) for cell in cells}
         finished = {}
         for cell in cells:
             if states[cell.id] == "finished":
-                path = folder.cell_file(cell)
-                returns = store.read_cell(folder.policy_files(cell)[1]) if cell.keeps_policies else None
-                finished[cell.id] = Outcome.of(
-                    cell, store.read_cell(path), store.read_metadata(path), returns
-                )
+                path, returns_path = folder.cell_file(cell), folder.policy_files(cell)[1]
+                table = _whole(path, contents.wrong_rows, cell)
+                returns = _whole(returns_path, contents.wrong_returns, cell) if cell.keeps_policies else None
+                finished[cell.id] = Outcome.of(cell, table, store.read_metadata(path), returns)
         return cls(finished, states, folder)
 
     def and_of(self, cells: Sequence[Cell]) -> Outcomes:

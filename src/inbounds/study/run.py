@@ -23,6 +23,7 @@ from multiprocessing.context import SpawnProcess
 from types import FrameType
 from typing import Any, NamedTuple
 
+from inbounds.headless import BackendError
 from inbounds.study.cell_run import DiskFullError, StudyError, run_cell
 from inbounds.study.claim import ClaimedError
 from inbounds.study.grid import Cell
@@ -294,7 +295,7 @@ def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Repo
         return Report("claimed", str(error))
     except DiskFullError as error:
         return Report("disk full", str(error))
-    except StudyError as error:
+    except (StudyError, BackendError) as error:
         return Report("failed", str(error))
     except OSError as error:
         return Report("failed", f"{error}: {OTHER_FOLDERS}")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ from inbounds.learning.storage.stored_config import differences
 from inbounds.study.claim import file_lock
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 
+ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
@@ -95,6 +97,22 @@ class StudyFolder:
 
     results: Path = Path("results")
     work: Path = Path("runs/study")
+
+    @classmethod
+    def shipped(cls, root: Path = ROOT) -> StudyFolder:
+        """Return the folders of the study that the project ships, wherever Python was started.
+
+        Args:
+            root: of the source tree.
+
+        Raises:
+            FileNotFoundError: there are no results: the package was installed without its source tree.
+        """
+        if not (root / "results" / "PROTOCOL.md").is_file():
+            raise FileNotFoundError(
+                "the study is not part of the installed package: clone the project, and `pip install -e .` in it"
+            )
+        return cls(root / "results", root / "runs" / "study")
 
     def cell_file(self, cell: Cell) -> Path:
         """Return the path of a cell's rows."""
@@ -256,7 +274,7 @@ def read_cell(path: str | Path) -> pa.Table:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError) as error:
-        raise _damaged(Path(path), error) from error
+        raise damaged(Path(path), error) from error
 
 
 def read_metadata(path: str | Path) -> dict[str, Any]:
@@ -271,20 +289,21 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-        raise _damaged(Path(path), error) from error
+        raise damaged(Path(path), error) from error
     if not {"config", "study_version", "id"} <= found.keys():
-        raise _damaged(Path(path), "it is no cell of a study")
+        raise damaged(Path(path), "it is no cell of a study")
     return found
 
 
-def _damaged(path: Path, reason: object) -> DamagedFileError:
+def damaged(path: Path, reason: object) -> DamagedFileError:
+    """Return the error that says what is wrong with a result and what to do."""
     said = (str(reason) or type(reason).__name__).splitlines()[0]
     return DamagedFileError(f"{path} is damaged ({said[:120]}): {restore(path)}")
 
 
 def restore(path: Path) -> str:
     """Return what to do about a damaged result."""
-    return f"restore it (git checkout -- {path}), or delete it and run the cell again"
+    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and run the cell again"
 
 
 # ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch

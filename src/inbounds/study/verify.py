@@ -18,8 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from inbounds.learning.storage.files import DamagedFileError
-from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, differences
-from inbounds.study import store
+from inbounds.study import contents, store
 from inbounds.study.grid import Cell
 from inbounds.study.measure import MeasuredTrainer
 from inbounds.study.provenance import provenance
@@ -131,39 +130,56 @@ def check_sums(folder: StudyFolder) -> list[Finding]:
 
 
 def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Finding]:
-    """Compare what each cell's file says of itself with the study, and count its rows."""
+    """Look into all files of each cell: whether they are listed, of the study, and hold what they must."""
+    sums = folder.checksums()
     findings = []
     for cell in cells:
         path = folder.cell_file(cell)
         if not path.is_file():
             continue
-        try:
-            metadata, rows = store.read_metadata(path), store.read_cell(path).num_rows
-        except DamagedFileError as error:
-            findings.append(Finding(cell.id, False, str(error)))
-            continue
-        if not store.is_of(cell, metadata):
-            said = f"of study version {metadata['study_version']} or another configuration: move it away"
-            findings.append(Finding(cell.id, False, said))
-        elif rows != cell.epochs * len(cell.seeds):
-            said = f"{rows} rows instead of {cell.epochs * len(cell.seeds)}: {store.restore(path)}"
+        for file in folder.files(cell):
+            name = file.relative_to(folder.results).as_posix()
+            if name not in sums and not file.is_file():  # else `check_sums` has seen it
+                said = f"missing, and not in {CHECKSUMS_FILE}: {store.restore(file)}"
+                findings.append(Finding(name, False, said))
+        if said := _wrong(cell, folder):
             findings.append(Finding(cell.id, False, said))
     return findings
+
+
+def _wrong(cell: Cell, folder: StudyFolder) -> str:
+    """What is wrong with the contents of a cell's files, the first thing; empty where nothing is."""
+    path, (policies, returns) = folder.cell_file(cell), folder.policy_files(cell)
+    tables: list[tuple[Path, Callable[[Cell, pa.Table], str]]] = [(path, contents.wrong_rows)]
+    if cell.keeps_policies and returns.is_file():
+        tables.append((returns, contents.wrong_returns))
+    for file, look in tables:
+        try:
+            metadata, table = store.read_metadata(file), store.read_cell(file)
+        except DamagedFileError as error:
+            return str(error)
+        if not store.is_of(cell, metadata):
+            version = metadata["study_version"]
+            return f"{file} is of study version {version} or another configuration: move it away"
+        if file == path and (lost := sorted({"sessions", "first_rewards"} - metadata.keys())):
+            return f"{file} does not say how it was made ({lost[0]} is missing): {store.restore(file)}"
+        if said := look(cell, table):
+            return f"{file}: {said}: {store.restore(file)}"
+    if cell.keeps_policies and policies.is_file() and (said := contents.wrong_policies(cell, policies)):
+        return f"{policies}: {said}: {store.restore(policies)}"
+    return ""
 
 
 def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
     """Run the first epochs of a cell again and compare them with its rows."""
     path = folder.cell_file(cell)
-    try:
-        rows, metadata = store.read_cell(path), store.read_metadata(path)
-    except (FileNotFoundError, DamagedFileError) as error:
-        return Finding(cell.id, False, str(error))
+    if not path.is_file():
+        return Finding(cell.id, False, f"there is no {path}: nothing to compare with")
+    if said := _wrong(cell, folder):
+        return Finding(cell.id, False, said)
+    rows, metadata = store.read_cell(path), store.read_metadata(path)
     epochs = min(epochs, cell.epochs)
     run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
-    if different := differences(run.config, metadata["config"], FREE_TO_CHANGE):
-        run.close()
-        said = ", ".join(different)
-        return Finding(cell.id, False, f"its file was made with another configuration ({said})")
     for _ in range(epochs):
         run.epoch()
     run.close()

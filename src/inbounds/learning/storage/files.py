@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import secrets
+import shlex
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -51,7 +52,8 @@ def find(run: str | Path, name: str) -> Path:
     if path.is_dir():
         path /= name
     if not path.is_file():
-        raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {path.parent})")
+        out = shlex.quote(str(path.parent))
+        raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {out})")
     return path
 
 

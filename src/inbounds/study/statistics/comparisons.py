@@ -257,6 +257,7 @@ def compare(
     Raises:
         MissingSeedError: a seed is missing and `missing` is "raise".
         ValueError: as `difference` raises.
+        TypeError: scores that are not named by environment.
 
     Example:
         >>> rng = np.random.default_rng(0)
@@ -266,6 +267,12 @@ def compare(
         >>> rows["Hopper-v5"].p_adjusted < 0.01, rows["Ant-v5"].difference
         (True, None)
     """
+    for scores in (first, second):
+        if not isinstance(scores, Mapping):
+            raise TypeError(
+                f"expected scores by environment, as {{'Hopper-v5': scores}}, got {type(scores).__name__}: for one "
+                "environment alone there are `difference` and `permutation_test`"
+            )
     planned = list(environments) if environments is not None else list(dict.fromkeys([*first, *second]))
     rows: list[tuple[Estimate | None, float]] = []
     # A generator each: what comes out for one environment does not depend on which others are there.

@@ -1,0 +1,88 @@
+"""What is no box for a bounded law is refused, and the remedy that the message names is one."""
+
+import re
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from inbounds.distributions.boxes import require_box
+
+
+class Heard(gymnasium.Env):
+    """It keeps the last action, which must be one of its own."""
+
+    observation_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def __init__(self, action_space: spaces.Space) -> None:
+        self.action_space = action_space
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict]:
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict]:
+        assert self.action_space.contains(np.asarray(action, self.action_space.dtype)), action
+        return np.zeros(1, np.float32), 0.0, False, False, {}
+
+
+WIDE, UNIT = spaces.Box(-3.0, 3.0, (2,), np.float32), spaces.Box(-1.0, 1.0, (1,), np.float32)
+CASES = {
+    "discrete": (spaces.Discrete(3), UNIT, "bounded, one-dimensional Box"),
+    "integers": (spaces.Box(-3, 3, (2,), np.int64), WIDE, "real numbers"),
+    "matrix": (spaces.Box(-3.0, 3.0, (1, 2), np.float32), WIDE, "one-dimensional Box"),
+    "unbounded": (spaces.Box(-np.inf, np.inf, (2,), np.float32), WIDE, "finite bounds"),
+    "half bounded": (spaces.Box(np.float32([0, -9]), np.float32([np.inf, 9])), None, "finite bounds"),
+    "no room": (spaces.Box(np.float32([-1, 2]), np.float32([1, 2])), WIDE, "component 1 has no room"),
+}
+
+
+@pytest.mark.parametrize(("space", "box", "rule"), CASES.values(), ids=CASES)
+def test_the_remedy_that_a_refusal_names_works(
+    space: spaces.Space, box: spaces.Box | None, rule: str
+) -> None:
+    with pytest.raises(ValueError, match=re.escape(rule)) as caught:
+        require_box(space)
+    (remedy,) = re.findall(
+        r"gymnasium\.wrappers\.\w+\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)", str(caught.value)
+    )
+    names = {
+        "env": Heard(space),
+        "box": box or spaces.Box(np.float32([0, -9]), np.float32([9, 9])),
+        "function": lambda action: int(np.rint(action[0])) + 1,
+    }
+    env = eval(remedy, {"gymnasium": gymnasium, "np": np, **names})
+    require_box(env.action_space)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for action in rng.uniform(env.action_space.low, env.action_space.high, (20, *env.action_space.shape)):
+        env.step(action.astype(env.action_space.dtype))
+
+
+def test_every_name_of_gymnasium_in_the_source_exists() -> None:
+    """Also in messages and docstrings."""
+    from tests.test_architecture import MODULES
+
+    found = {
+        name
+        for path in MODULES
+        for name in re.findall(r"gymnasium\.(wrappers(?:\.\w+)+)", path.read_text("utf8"))
+    }
+    assert {"wrappers.TransformAction", "wrappers.FlattenObservation"} <= found
+    for name in found:
+        module, _, attribute = f"gymnasium.{name}".rpartition(".")
+        assert hasattr(__import__(module, fromlist=[attribute]), attribute), name
+
+
+@pytest.mark.parametrize(
+    ("space", "flat"),
+    [(spaces.Discrete(5), 5), (spaces.Dict(a=spaces.Box(0.0, 1.0, (2,)), b=spaces.Discrete(2)), 4)],
+    ids=["discrete", "dict"],
+)
+def test_the_remedy_for_observations_works(space: spaces.Space, flat: int) -> None:
+    env = Heard(UNIT)
+    env.observation_space = space
+    found = gymnasium.wrappers.FlattenObservation(env).observation_space
+    assert isinstance(found, spaces.Box)
+    assert found.shape == (flat,)
