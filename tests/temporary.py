@@ -8,6 +8,7 @@ What pytest keeps of a test that failed (``tmp_path``) lies elsewhere, and stays
 import os
 import shutil
 import tempfile
+from multiprocessing import util
 from unittest import mock
 
 import pytest
@@ -20,7 +21,8 @@ def pytest_configure(config: pytest.Config) -> None:
         return  # a worker of pytest-xdist inherits the folder
     config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
     folder = tempfile.mkdtemp(prefix="inbounds-tests-")
-    config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+    # At exit, and after multiprocessing (-100), which has a folder of its own in this one.
+    util.Finalize(None, shutil.rmtree, args=(folder,), kwargs={"ignore_errors": True}, exitpriority=-1000)
     for patch in (
         mock.patch.dict(os.environ, TMPDIR=folder),
         mock.patch.object(tempfile, "tempdir", folder),

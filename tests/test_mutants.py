@@ -57,7 +57,7 @@ SOUND = Mutant(
     ("mutant", "status"),
     [
         (SOUND, pytest.ExitCode.OK),
-        (replace(SOUND, new="raise ValueError"), pytest.ExitCode.INTERRUPTED),
+        (replace(SOUND, new="raise ValueError"), pytest.ExitCode.USAGE_ERROR),
         (replace(SOUND, test="tests/distributions/test_contract.py::test_gone"), pytest.ExitCode.USAGE_ERROR),
     ],
     ids=["nobody notices", "nothing can be imported", "the test is gone"],
