@@ -52,6 +52,16 @@ def made_up(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
 
 
 @pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
+    """PPO's cells of two arms, and one mechanism on Hopper: seconds less than the whole study."""
+    folder = folder_in(tmp_path_factory.mktemp("few"))
+    arms = [cell for cell in study_cells() if cell.arm in ("standard", "beyond") and cell.algorithm == "ppo"]
+    entropy = [cell for cell in study_cells() if cell.id == "mechanisms-hopper-ppo-beta-entropy-0"]
+    write_cells(folder, arms + entropy)
+    return Outcomes.read(folder)
+
+
+@pytest.fixture(scope="module")
 def shipped() -> Outcomes:
     return Outcomes.read(SHIPPED)
 
@@ -431,10 +441,10 @@ def test_a_gap_that_is_not_clear_is_moot_whatever_is_left_of_it(there: bool) -> 
     assert half_left("x", now, None, ["gap"], claimed=True).state == "missing"
 
 
-def test_a_group_in_both_gaps_is_drawn_once(made_up: Outcomes) -> None:
+def test_a_group_in_both_gaps_is_drawn_once(few: Outcomes) -> None:
     """CAPG's gain over the Gaussian, and half of the logit-normal's gain over the same Gaussian: three groups."""
     (claim,) = claims_named(["cause-capg"])
-    for statement in judge(made_up, claim).statements:
+    for statement in judge(few, claim).statements:
         robot = statement.about.lower()
         names = [
             f"{arm}-{robot}-ppo-{family}"
@@ -444,7 +454,7 @@ def test_a_group_in_both_gaps_is_drawn_once(made_up: Outcomes) -> None:
                 ("standard", "logit-normal"),
             )
         ]
-        final = [made_up.finished[name].returns[:, -50:].mean(1) for name in names]
+        final = [few.finished[name].returns[:, -50:].mean(1) for name in names]
         variance = sum(w**2 * x.var(ddof=1) / len(x) for w, x in zip((1, 0.5, 0.5), final, strict=True))
         assert statement.estimate is not None
         width = float(statement.estimate.high - statement.estimate.low)
@@ -498,12 +508,12 @@ def rows_of(outcomes: Outcomes, cell: str, endpoint: str) -> float:
     ],
 )
 def test_a_loss_matters_beyond_the_margin(
-    made_up: Outcomes, monkeypatch: pytest.MonkeyPatch, ends: tuple[int, int], needs: State, serves: State
+    few: Outcomes, monkeypatch: pytest.MonkeyPatch, ends: tuple[int, int], needs: State, serves: State
 ) -> None:
     monkeypatch.setattr(evidence, "margin", lambda *_: 100.0)
     monkeypatch.setattr(evidence, "_change", lambda *_: estimate(*ends))
     for claimed, state in ((True, needs), (False, serves)):
-        (found,) = costs(["mechanisms-hopper-ppo-beta-entropy-0"], claimed=claimed)(made_up)
+        (found,) = costs(["mechanisms-hopper-ppo-beta-entropy-0"], claimed=claimed)(few)
         assert found.state == state
 
 
