@@ -182,6 +182,7 @@ def test_nbval_sees_a_cell_that_raises(tmp_path: Path) -> None:
     assert "planted" in done.stdout
 
 
+@pytest.mark.slow
 def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
     """nbval marks what follows a dead kernel as expected failures: that must not count as passing."""
     notebook = small_notebook(tmp_path)

@@ -68,6 +68,7 @@ def test_the_stored_text_does_not_change_when_cells_arrive(nothing: Outcomes, so
     assert not any(c.isdigit() for view in after if "discount" not in repr(view) for c in repr(view))
 
 
+@pytest.mark.slow
 def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path) -> None:
     report = write_report(some, tmp_path / "report.html").read_text(encoding="utf8")
     for view in (study_pages.state(some), study_pages.differences(some, "standard", "ppo")):

@@ -125,6 +125,7 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     assert any(text.startswith("1: ") and text.endswith(f"; {processor}") for text in page.items)
 
 
+@pytest.mark.slow
 def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     folder = folder_in(tmp_path)
     odd = select(["standard-swimmer-ppo-gaussian"])

@@ -63,6 +63,7 @@ def test_no_seed_sees_anothers_gradient() -> None:
         assert torch.equal(a[1:], b[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_it_learns(family: str) -> None:
     config = small_config("ppo", family, epochs=12, horizon=256, num_epochs=10, learning_rate=3e-3)

@@ -343,6 +343,7 @@ def test_numbers_do_not_depend_on_the_order_in_which_they_are_asked_for(shipped:
 # ---- the whole study
 
 
+@pytest.mark.slow
 def test_a_whole_study_leaves_nothing_missing(made_up: Outcomes) -> None:
     verdicts = {}
     for claim in FROM_CELLS:
@@ -402,6 +403,7 @@ def test_the_whole_study_decides_within_what_a_part_of_it_leaves_open(made_up: O
 # ---- what needs no cell
 
 
+@pytest.mark.slow
 def test_what_is_computed_on_the_spot_is_decided(shipped: Outcomes) -> None:
     """Mathematics and untrained policies: of cost alone the machine may have a say."""
     verdicts = {claim.id: judge(shipped, claim).verdict for claim in CLAIMS if not claim.cells}
