@@ -146,7 +146,7 @@ def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    from inbounds.book import figures
+    from inbounds.book.drawing import figures
 
     figures.use_style()
     envs = list(results["measurements"])

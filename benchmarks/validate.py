@@ -216,7 +216,7 @@ def plot(table: pa.Table, verdicts: dict[str, Any]) -> tuple[Any, str]:
     import matplotlib.pyplot as plt
     from scipy import stats
 
-    from inbounds.book import figures
+    from inbounds.book.drawing import figures
 
     figures.use_style()
     fig, axes = plt.subplots(1, len(verdicts), figsize=(figures.WIDTH, 3.4), squeeze=False)

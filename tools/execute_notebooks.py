@@ -13,7 +13,7 @@ HOOK = Path(__file__).with_name("notebook_hook.py")
 
 def main() -> int:
     if len(sys.argv) < 2:
-        print("no notebook named: make notebooks NB=notebooks/01_actions_have_bounds.ipynb")
+        print("no notebook named: make notebooks NB=notebooks/actions_have_bounds.ipynb")
         return 2
     for name in sys.argv[1:]:
         path, start = Path(name), time.perf_counter()

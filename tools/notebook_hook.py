@@ -46,7 +46,9 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
             found.append(f"cell {number}: execution count {cell.execution_count}, expected {expected}")
         expected += 1
         if (lines := lines_beside_imports(cell.source)) > 25:
-            found.append(f"cell {number}: {lines} lines beside its imports; one idea a cell, 25 lines at most")
+            found.append(
+                f"cell {number}: {lines} lines beside its imports; one idea a cell, 25 lines at most"
+            )
         for output in cell.outputs:
             if output.output_type == "error":
                 found.append(f"cell {number}: stores an error ({output.ename})")

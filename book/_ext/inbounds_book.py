@@ -22,7 +22,7 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.environment import BuildEnvironment
 
-from inbounds.book import explorables
+from inbounds.book.explorables.frame import javascript_files
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
@@ -39,7 +39,7 @@ def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         target = Path(app.outdir) / "_static" / FOLDER
         target.mkdir(parents=True, exist_ok=True)
-        for script in explorables.javascript_files():
+        for script in javascript_files():
             shutil.copy2(script, target / script.name)
 
 
@@ -49,7 +49,7 @@ def choose_scripts(
     """Drop thebe's scripts from every page; add the explorables' scripts to the pages that need them."""
     context["default_mode"] = "auto"  # follow the system; the theme logs an error where this is empty
     if EXPLORABLE in context.get("body", ""):
-        for script in explorables.javascript_files():
+        for script in javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
 

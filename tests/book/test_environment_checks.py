@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from inbounds import robots
-from inbounds.book import graders_own_environment
 from inbounds.book.environment_checks import CHECKS, complaints
+from inbounds.book.exercises import your_own_environment as graders
 from tests.learning.point import PointEnv
 
 
@@ -91,7 +91,7 @@ BROKEN = {
 @pytest.mark.parametrize("make", [PointEnv, lambda n: PointEnv(n, low=(-1, -0.5), high=(1, 2))])
 def test_a_sound_environment_passes(make: Callable) -> None:
     assert complaints(make) == {}
-    assert graders_own_environment.own_environment(make).passed is True
+    assert graders.own_environment(make).passed is True
 
 
 @pytest.mark.slow
@@ -102,7 +102,7 @@ def test_the_robots_pass() -> None:
 @pytest.mark.parametrize(("broken", "check"), BROKEN.items(), ids=lambda x: getattr(x, "__name__", x))
 def test_each_fault_is_stopped_by_its_check_first(broken: Callable, check: str) -> None:
     assert next(iter(complaints(broken))) == check
-    verdict = graders_own_environment.own_environment(broken)
+    verdict = graders.own_environment(broken)
     assert verdict.passed is False
     assert f'"{check}"' in verdict.message
 
@@ -131,13 +131,13 @@ def test_a_reset_in_another_step_is_refused_with_the_fix() -> None:
 def test_the_diagnosis() -> None:
     answers: dict[Any, Any] = dict(BROKEN)
     broken = {kind: kind for kind in BROKEN}
-    assert graders_own_environment.diagnosis(answers, broken).passed is True
-    verdict = graders_own_environment.diagnosis(answers | {Clockless: "seeds"}, broken)
+    assert graders.diagnosis(answers, broken).passed is True
+    verdict = graders.diagnosis(answers | {Clockless: "seeds"}, broken)
     assert verdict.passed is False
     assert "gets past that one" in verdict.message
-    verdict = graders_own_environment.diagnosis(answers | {Amnesic: "time limit"}, broken)
+    verdict = graders.diagnosis(answers | {Amnesic: "time limit"}, broken)
     assert "an earlier check" in verdict.message
-    verdict = graders_own_environment.diagnosis(answers | {Amnesic: "amnesia"}, broken)
+    verdict = graders.diagnosis(answers | {Amnesic: "amnesia"}, broken)
     assert all(name in verdict.message for name in CHECKS)
 
 
@@ -152,7 +152,7 @@ def value(gamma: float, steps: int) -> float:
 
 @pytest.mark.parametrize(("name", "right"), [("at_bounds", shares), ("value_under_a_clock", value)])
 def test_right_answers_pass_and_none_is_no_failure(name: str, right: Callable) -> None:
-    grader = getattr(graders_own_environment, name)
+    grader = getattr(graders, name)
     assert grader(right).passed is True
     assert grader(lambda *_: ...).passed is None
 
@@ -171,7 +171,7 @@ def test_right_answers_pass_and_none_is_no_failure(name: str, right: Callable) -
     ],
 )
 def test_mistakes_in_saturation_are_named(wrong: Callable, words: str) -> None:
-    verdict = graders_own_environment.at_bounds(wrong)
+    verdict = graders.at_bounds(wrong)
     assert verdict.passed is False
     assert words in verdict.message
 
@@ -188,6 +188,6 @@ def test_mistakes_in_saturation_are_named(wrong: Callable, words: str) -> None:
     ],
 )
 def test_mistakes_about_the_clock_are_named(wrong: Callable, words: str) -> None:
-    verdict = graders_own_environment.value_under_a_clock(wrong)
+    verdict = graders.value_under_a_clock(wrong)
     assert verdict.passed is False
     assert words in verdict.message

@@ -19,21 +19,21 @@ REFERENCE_PAGES = {
     "front_page",
     # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
     # every entry must have its own check (`test_every_erratum_is_checked`).
-    "19_errata",
+    "errata",
     # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
     # here the page must show every claim (`test_the_ledger_is_generated`).
-    "18_claims_ledger",
+    "claims_ledger",
     # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in
     # a cell and end in a project (`test_every_road_is_tried`).
-    "20_what_next",
+    "what_next",
 }
 CHAPTERS = [path for path in NOTEBOOKS if path.stem not in REFERENCE_PAGES]
 
 STUDY_CHAPTERS = {
     # They read what was measured and state no theorem of their own; all else a chapter owes its reader they owe too.
-    "15_figures_reproduced",
-    "16_one_thing_at_a_time",
-    "17_inside_the_policies",
+    "figures_reproduced",
+    "one_thing_at_a_time",
+    "inside_the_policies",
 }
 
 
@@ -96,7 +96,7 @@ def test_reference_pages_exist() -> None:
 
 def test_every_erratum_is_checked() -> None:
     """Each entry says where, what and what instead, stands in the table, and is followed by a cell that asserts."""
-    cells = nbformat.read(ROOT / "notebooks" / "19_errata.ipynb", as_version=4).cells
+    cells = nbformat.read(ROOT / "notebooks" / "errata.ipynb", as_version=4).cells
     page = "\n".join(f"<code>{c.source}" if c.cell_type == "code" else c.source for c in cells)
     front, *entries = re.split(r"^\((err-[a-z0-9-]+)\)=\n(?=#)", page, flags=re.MULTILINE)
     labels, texts = entries[::2], entries[1::2]
@@ -114,7 +114,7 @@ def test_every_erratum_is_checked() -> None:
 
 def test_the_ledger_is_generated() -> None:
     """The page shows the table of all claims, and says in words what a verdict is."""
-    cells = nbformat.read(ROOT / "notebooks" / "18_claims_ledger.ipynb", as_version=4).cells
+    cells = nbformat.read(ROOT / "notebooks" / "claims_ledger.ipynb", as_version=4).cells
     code = [cell.source for cell in cells if cell.cell_type == "code"]
     prose = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
     assert any("study_pages.findings(outcomes)" in source for source in code)
@@ -124,7 +124,7 @@ def test_the_ledger_is_generated() -> None:
 
 def test_every_road_is_tried() -> None:
     """Each road stands in the table, is tried by a cell that asserts, and ends in a project."""
-    cells = nbformat.read(ROOT / "notebooks" / "20_what_next.ipynb", as_version=4).cells
+    cells = nbformat.read(ROOT / "notebooks" / "what_next.ipynb", as_version=4).cells
     page = "\n".join(f"<code>{c.source}</code>" if c.cell_type == "code" else c.source for c in cells)
     front, *roads = re.split(r"^\((next-[a-z]+)\)=\n(?=#)", page, flags=re.MULTILINE)
     labels, texts = roads[::2], roads[1::2]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inbounds.book import figures
+from inbounds.book.drawing import figures
 from inbounds.book.over_seeds import MANY, draw, final_policies, mean_of, minus
 from inbounds.study import grid
 from inbounds.study.outcomes import Outcomes

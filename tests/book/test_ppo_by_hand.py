@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from inbounds.book import graders_ppo
+from inbounds.book.exercises import ppo as graders
 from tests.book import by_hand
 
-TEXT = by_hand.program_text("10_ppo", tag="ppo-by-hand", first_import="math")
+TEXT = by_hand.program_text("ppo", tag="ppo-by-hand", first_import="math")
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +24,9 @@ def test_the_program_does_without_the_package() -> None:
 
 
 def test_its_loss_and_its_update_pass_the_graders(program: dict[str, Any]) -> None:
-    assert graders_ppo.clipped_surrogate(program["clipped_surrogate"]).passed is True
-    assert graders_ppo.ppo_loss(program["ppo_loss"]).passed is True
-    assert graders_ppo.ppo_update(program["ppo_update"]).passed is True
+    assert graders.clipped_surrogate(program["clipped_surrogate"]).passed is True
+    assert graders.ppo_loss(program["ppo_loss"]).passed is True
+    assert graders.ppo_update(program["ppo_update"]).passed is True
 
 
 def test_it_learns_to_balance_a_pole(program: dict[str, Any]) -> None:

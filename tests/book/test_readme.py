@@ -6,7 +6,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from inbounds.book import study_pages
+from inbounds.book.report import study_pages
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast, change, differences, improvement
 from inbounds.study.outcomes import Outcomes
@@ -92,7 +92,7 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
 
 
 def test_what_robots_do(outcomes: Outcomes) -> None:
-    seen = glued("17_inside_the_policies")
+    seen = glued("inside_the_policies")
     said = bullet("Look at the robot")
     assert f"{seen['moves-loud']} of {seen['seeds-loud']} policies" in said
     assert f"{seen['moves-quiet']} of {seen['seeds-quiet']} that began quiet" in said

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from inbounds.book import graders_trpo
+from inbounds.book.exercises import trpo as graders
 from tests.book import by_hand
 
-TEXT = by_hand.program_text("11_trpo", tag="trpo-by-hand", first_import="itertools")
+TEXT = by_hand.program_text("trpo", tag="trpo-by-hand", first_import="itertools")
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def test_the_program_does_without_the_package() -> None:
 
 
 def test_its_step_passes_the_grader(program: dict[str, Any]) -> None:
-    assert graders_trpo.trpo_step(program["trpo_step"]).passed is True
+    assert graders.trpo_step(program["trpo_step"]).passed is True
 
 
 @pytest.mark.parametrize("law", ["NORMAL", "BETA"])

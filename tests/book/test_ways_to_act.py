@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from inbounds.book import figures, study_pages, ways_to_act
-from inbounds.book.ways_to_act import Row
+from inbounds.book.drawing import figures
+from inbounds.book.report import study_pages, ways_to_act
+from inbounds.book.report.ways_to_act import Row
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate
 

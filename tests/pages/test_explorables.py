@@ -7,7 +7,8 @@ import pytest
 import torch
 from playwright.sync_api import BrowserContext, Locator, Page
 
-from inbounds.book.explorables import bounded_densities, javascript_files
+from inbounds.book.explorables.bounded_densities import bounded_densities
+from inbounds.book.explorables.frame import javascript_files
 from inbounds.distributions import LogitNormal
 from tests.pages import browser as book
 

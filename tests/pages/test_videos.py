@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, BrowserContext, Locator
 
-from inbounds.book import videos
+from inbounds.book.drawing import videos
 from inbounds.robots import Film
 from tests.pages import browser as book
 

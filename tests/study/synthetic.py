@@ -8,10 +8,10 @@ import pyarrow as pa
 
 from inbounds import learning
 from inbounds.study import Cell, StudyFolder
-from inbounds.study.cell_run import RETURNS
 from inbounds.study.grid import FAMILIES
-from inbounds.study.measure import MEASURE_EVERY
-from inbounds.study.provenance import provenance
+from inbounds.study.running.measure import MEASURE_EVERY
+from inbounds.study.running.one_cell import RETURNS
+from inbounds.study.running.provenance import provenance
 from inbounds.study.store import cell_metadata, parquet_bytes, table_of
 
 WAYS = ("mean", "median", "mode", "sample")

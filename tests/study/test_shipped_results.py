@@ -10,7 +10,7 @@ import pytest
 
 from inbounds.study import StudyFolder, all_cells
 from inbounds.study.grid import STUDY_VERSION
-from inbounds.study.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
+from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
 
 ROOT = Path(__file__).parents[2]
 RESULTS = StudyFolder(ROOT / "results", ROOT / "runs" / "study")

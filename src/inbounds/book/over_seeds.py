@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inbounds.book import figures
+from inbounds.book.drawing import figures
 from inbounds.learning import TrainedPolicy, load_policy
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate, bootstrap, difference

@@ -1,7 +1,7 @@
 """What PPO's loss must do, as named checks: each looks at one thing, and says in words what is wrong with it.
 
 They see a loss from outside, as a function of two networks and a minibatch, by its value and its gradients:
-`inbounds.book.graders_ppo` runs them on what readers write, in the order of `CHECKS`.
+`inbounds.book.exercises.ppo` runs them on what readers write, in the order of `CHECKS`.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from inbounds.book.figures import FAMILIES
+from inbounds.book.drawing.figures import FAMILIES
 from inbounds.study import StudyFolder, analysis
 from inbounds.study.grid import ARMS
 from inbounds.study.outcomes import Column, Outcomes

@@ -24,9 +24,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from inbounds.book import alt_text
-from inbounds.book.report_page import bullets, paragraph, table
-from inbounds.book.shown import Shown
+from inbounds.book.drawing import alt_text
+from inbounds.book.report.html import bullets, paragraph, table
+from inbounds.book.report.shown import Shown
 from inbounds.study.words import percent
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py

@@ -32,7 +32,7 @@ EXAMPLES = {
     "study": """\
   inbounds study status
   inbounds study run standard --nice 19 --max-minutes 60
-  inbounds study run --scheduler tcp://host:8786      (on a Dask cluster; see `inbounds.study.cluster`)
+  inbounds study run --scheduler tcp://host:8786      (on a Dask cluster; see `inbounds.study.running.cluster`)
   inbounds study report --out report.html
   inbounds study verify --random 2 --epochs 20""",
 }

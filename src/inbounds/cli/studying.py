@@ -13,14 +13,14 @@ from rich.console import Console
 from tyro.conf import Positional, arg, subcommand
 
 from inbounds.learning.storage.files import DamagedFileError
-from inbounds.study.cell_run import StudyError
 from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.progress import StudyProgress, cell_status, status_table
-from inbounds.study.run import Settings, run_study
+from inbounds.study.running.many_cells import Settings, run_study
+from inbounds.study.running.one_cell import StudyError
+from inbounds.study.running.progress import StudyProgress, cell_status, status_table
+from inbounds.study.running.verify import Finding, verify
 from inbounds.study.store import StudyFolder
-from inbounds.study.verify import Finding, verify
 
 Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...]")]
 
@@ -197,7 +197,7 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
 
 def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
     try:
-        from inbounds.book.study_report import write_report
+        from inbounds.book.report.study_report import write_report
     except ImportError as error:
         raise StudyError(
             f"the report draws with Matplotlib ({error}): pip install '.[book]' in the source tree"

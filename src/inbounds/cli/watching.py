@@ -12,7 +12,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from numpy.typing import NDArray
 
 from inbounds import robots  # its names are imported on first use, and MuJoCo with them
-from inbounds.book.videos import require_encoder, write_film
+from inbounds.book.drawing.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError, is_ours
 from inbounds.cli.modules import find_modules_here, module_of
 from inbounds.cli.options import Watch, quoted

@@ -19,8 +19,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from inbounds.study import contents, store
+from inbounds.study import store
 from inbounds.study.grid import ARMS, Cell, study_cells
+from inbounds.study.running import contents
 from inbounds.study.statistics import carry_forward
 from inbounds.study.store import State, StudyFolder
 

@@ -1,1 +1,0 @@
-"""What explorables share (frame.py), and their mathematics in JavaScript (*.js)."""

@@ -1,0 +1,1 @@
+"""How the book draws: figures in one style with alt text, and films."""

@@ -1,0 +1,93 @@
+"""Graders of the chapter *Many steps from one batch* (`judging` tells how one works)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+
+from inbounds.book.exercises.judging import Case, Verdict, judge
+
+__all__ = ["effective_sample_size", "surrogate_of"]
+
+
+def effective_sample_size(function: Callable[..., Any]) -> Verdict:
+    """(Σ r)² / Σ r² from log-ratios, without overflow."""
+
+    def case(log_ratio: np.ndarray, **known: Any) -> Case:
+        n = len(log_ratio)
+        right = float(np.exp(2 * logsumexp(log_ratio) - logsumexp(2 * log_ratio)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            ratio = np.exp(log_ratio)
+            mistakes = {
+                "that is the share n_eff/n: multiply by n": right / n,
+                "that is n divided by it: the second moment of the ratios": n / right,
+                "it must not change when all ratios are multiplied by a number: divide by the sum first": n
+                * ratio.mean() ** 2,
+                "the ratios are squared before they are summed, twice": ratio.sum() / np.sum(ratio**2),
+                "those are the log-ratios' sums: exponentiate first": log_ratio.sum() ** 2
+                / np.sum(log_ratio**2),
+                "the variance is taken about the mean: it is the second moment that counts": n
+                / max(ratio.var() / ratio.mean() ** 2, 1e-300)
+                if np.isfinite(ratio).all()
+                else np.nan,
+            }
+        return Case((log_ratio,), right, {k: v for k, v in mistakes.items() if np.isfinite(v)}, **known)
+
+    rng = np.random.default_rng(0)
+    draws = rng.normal(-0.1, 0.5, 50)
+    overflow = "a log-ratio of 1000 overflows: subtract the largest before you exponentiate"
+    underflow = "log-ratios of −1000 underflow: subtract the largest before you exponentiate"
+    cases = [
+        case(draws),
+        case(np.zeros(7)),
+        case(draws + 1000.0, hint=overflow),
+        case(draws - 1000.0, hint=underflow),
+        case(np.array([0.0, -3.0, 900.0]), hint=overflow),
+    ]
+    return judge(function, cases, "right, for any size of the ratios")
+
+
+def surrogate_of(function: Callable[..., Any]) -> Verdict:
+    """The surrogate of a Gaussian policy with several action dimensions."""
+    rng = np.random.default_rng(0)
+
+    def case(steps: int, act_dim: int) -> Case:
+        old_loc, loc = rng.normal(0, 0.5, (2, steps, act_dim))
+        old_scale, scale = rng.uniform(0.7, 1.4, (2, steps, act_dim))
+        latent = old_loc + old_scale * rng.standard_normal((steps, act_dim))
+        advantage = rng.normal(size=steps)
+
+        def log_ratio(denominator: np.ndarray) -> np.ndarray:
+            new, old = (latent - loc) / scale, (latent - old_loc) / denominator
+            return (old**2 - new**2) / 2 - np.log(scale / denominator)
+
+        def weighted(ratio: np.ndarray) -> float:
+            return float(ratio @ advantage / steps)
+
+        right, same_scale = log_ratio(old_scale), log_ratio(scale)
+        mistakes = {
+            "both errors are still there: the old law's scale, and the mean over dimensions": weighted(
+                np.exp(same_scale).mean(1)
+            ),
+            "the ratio of a vector is the product over its dimensions, not the mean": weighted(
+                np.exp(right).mean(1)
+            ),
+            "sum the log-ratios, do not average them: densities of coordinates multiply": weighted(
+                np.exp(right.mean(1))
+            ),
+            "the old law has the old scale": weighted(np.exp(same_scale.sum(1))),
+            "that is the sum of the dimensions' ratios: multiply them": weighted(np.exp(right).sum(1)),
+            "old and new are swapped": weighted(np.exp(-right.sum(1))),
+            "that is the sum over steps: take their mean": steps * weighted(np.exp(right.sum(1))),
+            "the log-ratio is not exponentiated": weighted(right.sum(1)),
+        }
+        return Case(
+            (loc, scale, old_loc, old_scale, latent, advantage), weighted(np.exp(right.sum(1))), mistakes
+        )
+
+    return judge(
+        function, [case(5, 3), case(40, 6), case(3, 1)], "right: one ratio per step, of two whole laws"
+    )

@@ -1,0 +1,61 @@
+"""The claims of the source thesis in the study's report: one table, every number from the finished cells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from inbounds.book.report import html
+from inbounds.study.ledger import Finding
+from inbounds.study.ledger.verdicts import STAYS
+from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.words import percent
+
+HEAD = ("claim", "verdict, test and result")
+_CAPTION = (
+    f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds; p of a "
+    "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible, or, not after "
+    "Holm, the test does not find what it shows. Moot: there is nothing to explain. Exploratory: the protocol does not "
+    "list such a number. Stays undecided: no missing cell can decide it."
+)
+
+
+def ledger_section(found: Sequence[Finding]) -> list[str]:
+    """Return the count of verdicts and the table of claims.
+
+    Args:
+        found: in the order of the table.
+    """
+    rows = [
+        [
+            f"{each.claim.says}\n({each.claim.where})\n{each.claim.command}",
+            f"{each.verdict.upper()}\n{each.counted}\ncells: {each.cells}; {each.claim.standing}\n"
+            f"Test: {each.claim.test}\n{each.told}",
+        ]
+        for each in found
+    ]
+    return [html.paragraph(counted(found)), html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))]
+
+
+def counted(found: Sequence[Finding]) -> str:
+    """Say how many claims have which verdict.
+
+    Example:
+        >>> counted([])
+        '0 claims: 0 supported, 0 refuted, 0 undecided.'
+    """
+    verdicts = Counter(each.verdict for each in found)
+    told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in ("supported", "refuted", "undecided"))
+    stay = sum(each.outlook == STAYS for each in found)
+    rest = f", of which {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives" if stay else ""
+    return f"{len(found)} claim{'' if len(found) == 1 else 's'}: {told}{rest}."
+
+
+def decided(found: Sequence[Finding]) -> list[str]:
+    """Return the claims that are decided, as a list; a paragraph where none is."""
+    told = [
+        f"{each.verdict.capitalize()}: {each.claim.says} ({', '.join(each.told.splitlines())})"
+        for each in found
+        if each.verdict != "undecided"
+    ]
+    return [html.bullets(told) if told else html.paragraph("No claim is decided yet.", "missing")]

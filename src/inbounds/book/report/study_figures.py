@@ -1,0 +1,301 @@
+"""How the study is drawn: learning curves, intervals, differences, performance profiles.
+
+Every figure says what its band or bar is and how many seeds it rests on; a seed that diverged or was left out is
+counted beside its curve, and a cell that was not run, or not finished, keeps its place and is called missing. Data come
+in as the results of `inbounds.study.statistics`; nothing here reads a file or computes a statistic::
+
+    curves = {"Hopper-v5": {"beta": Curve(steps, learning_curve(returns, rng)), "logit-normal": None}}
+    figures.show(learning_curves(curves), alt="Return against environment steps: ...")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from inbounds.book.drawing.figures import FAMILIES, WIDTH, family_style, use_style
+from inbounds.book.report.study_panels import (
+    SMALL,
+    families_in,
+    family_legend,
+    left_out,
+    list_gaps,
+    lowest,
+    note,
+    panel_grid,
+    without_scale,
+)
+from inbounds.study.statistics import Comparison, Estimate, Profile
+from inbounds.study.words import p_equals
+
+__all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "performance_profiles"]
+
+_QUIET = "#5F6770"
+_NOT_PLANNED = "not planned"
+SHORT = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", "beta": "Beta", "logit-normal": "Logit-normal"}
+"""Names where there is little room."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A learning curve over seeds.
+
+    Drawn by `learning_curves`, which has an example.
+    """
+
+    steps: NDArray[np.float64]
+    """`[E]` environment steps of each seed at the end of each epoch."""
+    estimate: Estimate
+    """`[E]` return and its band."""
+
+
+def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel: str = "return") -> Figure:
+    """Learning curves with bands: a panel per environment, a line per policy family.
+
+    Args:
+        curves: per environment and family (a key of `FAMILIES`) its curve, or None where the cell is missing.
+        ylabel: what the curves show.
+
+    Returns:
+        The figure; each panel has its own vertical scale, for returns of different robots share no unit.
+
+    Raises:
+        ValueError: nothing to draw, an unknown family, or steps and returns of different lengths.
+
+    Example:
+        >>> from inbounds.study.statistics import learning_curve
+        >>> steps, rng = 2048.0 * np.arange(1, 6), np.random.default_rng(0)
+        >>> curve = Curve(steps, learning_curve(rng.normal(size=(10, 5)), rng))
+        >>> fig = learning_curves({"Hopper-v5": {"beta": curve, "logit-normal": None}})
+        >>> [text.get_text() for text in fig.axes[0].texts]
+        ['Logit-normal: missing']
+    """
+    families = families_in(curves.values())
+    with use_style():
+        fig, axes = panel_grid(list(curves), row_height=2.55)
+        for ax, cells in zip(axes, curves.values(), strict=True):
+            for family, curve in cells.items():
+                if curve is not None:
+                    _curve(ax, family, curve)
+            list_gaps(ax, {family: c.estimate if c else None for family, c in cells.items()})
+            ax.yaxis.set_major_locator(MaxNLocator(5))
+            ax.xaxis.set_major_locator(MaxNLocator(5))
+            if not any(cells.values()):
+                without_scale(ax, "both")
+        fig.supylabel(ylabel, fontsize=13)
+        for ax in lowest(axes):
+            ax.set_xlabel("env steps per seed [millions]")
+        family_legend(fig, families)
+        drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
+        note(fig, "Line", "Band", drawn, ", at each epoch by itself")
+    return fig
+
+
+def _curve(ax: Any, family: str, curve: Curve) -> None:
+    """Draw one line and its band; the marker's first place depends on the family, so that none hides another."""
+    value = np.asarray(curve.estimate.value)
+    if value.ndim != 1 or len(value) != len(curve.steps):
+        raise ValueError(
+            f"{family}: {len(curve.steps)} steps for returns of shape {value.shape}: expected one return an epoch"
+        )
+    every = max(1, len(value) // 5)
+    style = family_style(family)
+    millions = np.asarray(curve.steps) / 1e6
+    ax.fill_between(
+        millions, curve.estimate.low, curve.estimate.high, color=style["color"], alpha=0.18, linewidth=0
+    )
+    first = list(FAMILIES).index(family) * every // len(FAMILIES)
+    ax.plot(millions, value, marker=FAMILIES[family].marker, markevery=(first, every), linewidth=1.8, **style)
+
+
+def interval_panels(
+    panels: Mapping[str, Mapping[str, Estimate | None]],
+    *,
+    xlabel: str = "mean return over the last 10 % of epochs",
+    reference: float | None = None,
+) -> Figure:
+    """Point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
+
+    Args:
+        panels: per panel and family its estimate, or None where the cell is missing; a family that one panel names
+            and another does not keeps its row there, as not planned.
+        xlabel: what is estimated, with its unit.
+        reference: where to draw a vertical line, such as 0 for differences.
+
+    Returns:
+        The figure; a hollow marker means that seeds were left out, and the row says how many.
+
+    Raises:
+        ValueError: nothing to draw, an unknown family, or an estimate that is an array.
+
+    Example:
+        >>> from inbounds.study.statistics import bootstrap
+        >>> scores = bootstrap([1.0, 2.0, 3.0, 4.0], np.random.default_rng(0))
+        >>> fig = interval_panels({"Ant-v5": {"gaussian": scores, "beta": None}})
+        >>> [label.get_text() for label in fig.axes[0].get_yticklabels()]
+        ['Gaussian, clipped', 'Beta']
+    """
+    families = families_in(panels.values())
+    rows = {family: (FAMILIES[family].label, family) for family in families}
+    cells = {
+        title: {f: (given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
+        for title, given in panels.items()
+    }
+    return _bars(cells, rows, xlabel, reference)
+
+
+def difference_panels(
+    panels: Mapping[str, Mapping[tuple[str, str], Comparison]],
+    *,
+    xlabel: str = "difference of returns",
+) -> Figure:
+    """Differences between families with interval bars: a panel per environment, a row per pair.
+
+    Args:
+        panels: per environment and pair (first, second) of families their comparison, first minus second.
+        xlabel: what the difference is of, with its unit.
+
+    Returns:
+        The figure, with a line at zero; beside each bar stands the p-value after Holm's correction.
+
+    Raises:
+        ValueError: nothing to draw, or an unknown family.
+
+    Example:
+        >>> from inbounds.study.statistics import compare
+        >>> a, b = {"Ant-v5": [5.0, 6.0, 7.0]}, {"Ant-v5": [1.0, 2.0, 4.0]}
+        >>> row = compare(a, b, np.random.default_rng(0))["Ant-v5"]
+        >>> fig = difference_panels({"Ant-v5": {("beta", "gaussian"): row}})
+        >>> fig.axes[0].get_yticklabels()[0].get_text().splitlines()
+        ['Beta', '− Gaussian']
+    """
+    pairs = list(dict.fromkeys(pair for cells in panels.values() for pair in cells))
+    for family in {family for pair in pairs for family in pair}:
+        family_style(family)
+    rows = {pair: (f"{SHORT[pair[0]]}\n− {SHORT[pair[1]]}", pair[0]) for pair in pairs}
+    cells = {
+        title: {
+            pair: (row.difference, p_equals(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
+            for pair in pairs
+        }
+        for title, given in panels.items()
+    }
+    return _bars(
+        cells,
+        rows,
+        xlabel,
+        reference=0.0,
+        remark="p: permutation test of the means, after Holm's correction over environments.",
+    )
+
+
+def _bars(
+    cells: Mapping[str, Mapping[Any, tuple[Estimate | None, str]]],
+    rows: Mapping[Any, tuple[str, str]],
+    xlabel: str,
+    reference: float | None,
+    remark: str = "",
+) -> Figure:
+    """Draw interval bars; `rows` gives each row's label and the family whose look it wears."""
+    with use_style():
+        fig, axes = panel_grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True)
+        for ax, given in zip(axes, cells.values(), strict=True):
+            for place, (key, (estimate, remark_here)) in enumerate(given.items()):
+                _bar(ax, place, rows[key][1], estimate, remark_here)
+            if any(estimate for estimate, _ in given.values()):
+                if reference is not None:
+                    ax.axvline(reference, color=_QUIET, linewidth=1.2, zorder=1)
+            else:
+                without_scale(ax, "x")
+            ax.set_ylim(len(rows) - 0.4, -0.75)
+            ax.set_yticks(range(len(rows)), [label for label, _ in rows.values()])
+            ax.tick_params(axis="y", length=0)
+            ax.grid(visible=False, axis="y")
+            ax.margins(x=0.12)
+            ax.xaxis.set_major_locator(MaxNLocator(3))
+        # One label for all panels; below them it would lie on the note, which the layout engine places there.
+        fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
+        drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
+        note(fig, "Marker", "Bar", drawn, "", remark)
+    return fig
+
+
+def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: str) -> None:
+    """Draw one row: marker, interval, and in words what is not as it should be."""
+    if estimate is None:
+        ax.text(
+            0.5, place, remark or "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
+            style="italic", color=_QUIET, fontsize=SMALL,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
+        return
+    value, low, high = (np.asarray(x) for x in (estimate.value, estimate.low, estimate.high))
+    if value.ndim:
+        raise ValueError(f"expected one number a row, got an estimate of shape {value.shape}")
+    look = FAMILIES[family]
+    ax.plot([low, high], [place, place], color=look.color, linewidth=2.2, linestyle="-")
+    ax.plot(
+        value, place, look.marker, color=look.color, markersize=8, markeredgewidth=1.8,
+        markerfacecolor="white" if estimate.missing else look.color,
+    )  # fmt: skip
+    words = ", ".join(filter(None, [remark, left_out(estimate)]))
+    if words:
+        ax.text(
+            0.99, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="right", va="bottom", fontsize=10,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
+
+
+def performance_profiles(
+    profiles: Mapping[str, Profile | None], *, xlabel: str = "normalised score τ"
+) -> Figure:
+    """Performance profiles with bands: the share of runs that score more than τ, a line per policy family.
+
+    Args:
+        profiles: per family its profile, or None where it is missing.
+        xlabel: what τ is, and how it is normalised.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ValueError: nothing to draw, or an unknown family.
+
+    Example:
+        >>> from inbounds.study.statistics import performance_profile
+        >>> taus, rng = np.linspace(0, 1, 5), np.random.default_rng(0)
+        >>> fig = performance_profiles({"beta": performance_profile({"Ant-v5": rng.random(10)}, taus, rng)})
+        >>> fig.axes[0].get_xlabel()
+        'normalised score τ'
+    """
+    families = families_in([profiles])
+    with use_style():
+        fig, ax = plt.subplots(figsize=(WIDTH, 4.6))
+        for family, profile in profiles.items():
+            if profile is not None:
+                style = family_style(family)
+                tau, share = profile.thresholds, profile.share
+                ax.fill_between(tau, share.low, share.high, color=style["color"], alpha=0.18, linewidth=0)
+                every = max(1, len(tau) // 5)
+                first = list(FAMILIES).index(family) * every // len(FAMILIES)
+                ax.plot(
+                    tau,
+                    share.value,
+                    marker=FAMILIES[family].marker,
+                    markevery=(first, every),
+                    linewidth=1.8,
+                    **style,
+                )
+        list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
+        ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
+        ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
+        family_legend(fig, families)
+        note(fig, "Line", "Band", [p.share for p in profiles.values() if p], ", at each τ by itself")
+    return fig

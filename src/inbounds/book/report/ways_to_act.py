@@ -1,0 +1,138 @@
+"""What another way to act than the median earns on the study's final policies: chapter 6's figure and its verdict.
+
+    rows = rows_of(study_pages.shipped())
+    fig = draw(rows)
+
+Only of the Beta and the logit-normal, whose mean, median and mode all differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from inbounds.book.drawing.figures import FAMILIES, WIDTH
+from inbounds.study.grid import ROBOTS, Cell
+from inbounds.study.outcomes import Outcome, Outcomes
+from inbounds.study.statistics import Estimate, difference
+
+BOUNDED: Mapping[str, str] = {"beta": "Beta", "logit-normal": "logit-normal"}
+"""Families with three centres, and their names within a label."""
+WAYS: Mapping[str, str] = {"mean": "mean", "mode": "mode", "sample": "noise kept"}
+"""What is compared with the median, and its panel's title."""
+RESAMPLES = 100_000
+"""Enough that the generator's luck does not move an interval's end across zero."""
+_ROW_HEIGHT = 0.24  # inches
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a cell's policies earn by other ways to act.
+
+    Made by `rows_of`, which has an example.
+    """
+
+    robot: str
+    """Of the cell."""
+    label: str
+    """Algorithm, family and what is changed, in words; unique within a robot."""
+    family: str
+    """Of the cell."""
+    gains: Mapping[str, Estimate]
+    """By way to act (`WAYS`): the return less the median's, a mean over seeds, in % of the median's return."""
+
+    def found(self, way: str) -> int:
+        """Return the sign of the difference, 0 where its 95 % interval holds zero.
+
+        Example:
+            >>> gain = Estimate(-3.0, -5.0, -1.0, 10, 0, 0.95, "difference of means")
+            >>> Row("Ant", "PPO, Beta", "beta", {"mode": gain}).found("mode")
+            -1
+        """
+        gain = self.gains[way]
+        return int(gain.low > 0) - int(gain.high < 0)
+
+
+def rows_of(outcomes: Outcomes) -> list[Row]:
+    """Return one row for each finished cell of a bounded family whose policies were kept, robot by robot.
+
+    Args:
+        outcomes: of the study.
+
+    Example:
+        >>> from inbounds.study import StudyFolder, select
+        >>> outcomes = Outcomes.read(StudyFolder(), select(["standard-ant-ppo-beta"]))  # in the project's folder
+        >>> [(row.robot, row.label, row.found("mode")) for row in rows_of(outcomes)]
+        [('Ant', 'PPO, Beta', -1)]
+    """
+    kept = [o for o in outcomes.finished.values() if o.ways and o.cell.family in BOUNDED]
+    rows = [Row(o.cell.robot, in_words(o.cell), o.cell.family, _gains(o)) for o in kept]
+    return sorted(rows, key=lambda row: (ROBOTS.index(row.robot), row.label.count(","), row.label))
+
+
+def in_words(cell: Cell) -> str:
+    """Say what a cell trains, but for its robot.
+
+    Example:
+        >>> in_words(Cell("mechanisms", "ppo", "logit-normal", "Hopper", variant="matched-noise"))
+        'PPO, logit-normal, matched noise'
+    """
+    name, _, value = cell.variant.partition("gamma-")
+    variant = f"γ = {value}" if value else name.replace("-", " ")
+    return ", ".join(filter(None, [cell.algorithm.upper(), BOUNDED[cell.family], variant]))
+
+
+def _gains(outcome: Outcome) -> dict[str, Estimate]:
+    unit = np.nanmean(np.abs(outcome.ways["median"])) / 100
+    return {
+        way: difference(
+            outcome.ways[way] / unit,
+            outcome.ways["median"] / unit,
+            np.random.default_rng(0),
+            statistic="mean",
+            paired=True,
+            resamples=RESAMPLES,
+            missing="exclude",
+        )
+        for way in WAYS
+    }
+
+
+def draw(rows: Sequence[Row]) -> Figure:
+    """Draw a row for each cell under the name of its robot, and a panel for each way to act.
+
+    Args:
+        rows: as `rows_of` returns them.
+
+    Example:
+        >>> gain = Estimate(-3.0, -5.0, -1.0, 10, 0, 0.95, "difference of means")
+        >>> fig = draw([Row("Ant", "PPO, Beta", "beta", dict.fromkeys(WAYS, gain))])
+        >>> [label.get_text() for label in fig.axes[0].get_yticklabels()]
+        ['Ant', 'PPO, Beta']
+        >>> plt.close(fig)
+    """
+    lines: list[Row | str] = []
+    for robot in dict.fromkeys(row.robot for row in rows):
+        lines += [robot, *(row for row in rows if row.robot == robot)]
+    size = (WIDTH, 1.1 + _ROW_HEIGHT * len(lines))
+    fig, axes = plt.subplots(1, len(WAYS), sharex=True, sharey=True, figsize=size, squeeze=False)
+    for ax, (way, title) in zip(axes.flat, WAYS.items(), strict=True):
+        for place, row in enumerate(lines):
+            if isinstance(row, Row):
+                gain, look = row.gains[way], FAMILIES[row.family]
+                reach = [[gain.value - gain.low], [gain.high - gain.value]]
+                ax.errorbar(gain.value, place, xerr=reach, fmt=look.marker, color=look.color, markersize=5)
+        ax.axvline(0, color="#8a8f98", linewidth=1, linestyle=":")
+        ax.set_title(title)
+    first = axes.flat[0]
+    names = [row.label if isinstance(row, Row) else row for row in lines]
+    first.set_yticks(range(len(lines)), names, fontsize=10)
+    first.set_ylim(len(lines) - 0.4, -0.6)
+    for label, row in zip(first.get_yticklabels(), lines, strict=True):
+        label.set_fontweight("normal" if isinstance(row, Row) else "bold")
+    fig.supxlabel("return less the median's, % of the median's")
+    return fig

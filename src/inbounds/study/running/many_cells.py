@@ -1,0 +1,350 @@
+"""Many cells: on the cores of this machine, one single-threaded process per cell, or on a Dask cluster.
+
+There is no scheduler to lose. Each process claims its cell (`cell_lock`), so several runs on one folder share the
+work; whatever dies is gone on with, from its last checkpoint, by whoever comes next.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import subprocess
+import time
+import traceback
+import warnings
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from types import FrameType
+from typing import Any, NamedTuple
+
+from inbounds.headless import BackendError
+from inbounds.study.grid import Cell
+from inbounds.study.running.cell_lock import ClaimedError
+from inbounds.study.running.one_cell import DiskFullError, StudyError, run_cell
+from inbounds.study.running.progress import StudyProgress
+from inbounds.study.store import StudyFolder
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)  # Ctrl-C, and what job schedulers send
+RETRIES = 2  # of a cell whose process died
+ENVIRONMENT = {  # of the processes; none of it changes a result
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    # glibc raises its threshold for giving memory back as larger blocks are freed; held, HalfCheetah needs half as much
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 20),
+}
+LOOK_EVERY = 1.0  # seconds between looks at running cells
+MOST_WARNINGS = 20  # of a cell that are shown
+OTHER_FOLDERS = "choose other folders with --results and --work"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to run cells; nothing here changes a result.
+
+    Example:
+        >>> Settings(jobs=2, nice=19, max_minutes=60).scheduler is None  # two processes on this machine, for an hour
+        True
+    """
+
+    jobs: int | None = None
+    """Processes at a time; None is one per core that this process may use."""
+    nice: int = 0
+    """Added to the processes' niceness: 19 leaves the machine to everything else."""
+    max_minutes: float | None = None
+    """When time is up, running cells save a checkpoint and stop; no cell is started."""
+    commit: bool = False
+    """Commit the results of each finished cell with git."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, tcp://host:port, whose workers share the folders; None runs here."""
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise ValueError(f"jobs must be at least 1, got {self.jobs}")
+        if not 0 <= self.nice <= 19:
+            raise ValueError(f"nice must be between 0 and 19, got {self.nice}")
+
+
+class Report(NamedTuple):
+    """What became of a cell.
+
+    Part of what `run_study` returns, which has an example.
+    """
+
+    outcome: str
+    """finished, was finished, stopped, claimed, failed, disk full or died."""
+    message: str = ""
+    """What to do, where something is to be done."""
+
+
+class Summary(NamedTuple):
+    """What became of a run.
+
+    Made by `run_study`, which has an example.
+    """
+
+    reports: dict[str, Report]
+    """By the cell's id; cells that were not started are not in it."""
+    signal: int = 0
+    """The one that ended it, if one did."""
+
+    @property
+    def failed(self) -> dict[str, Report]:
+        """The cells that somebody has to do something about."""
+        return {name: r for name, r in self.reports.items() if r.outcome in ("failed", "disk full", "died")}
+
+
+def run_study(
+    cells: Sequence[Cell],
+    folder: StudyFolder,
+    settings: Settings | None = None,
+    progress: StudyProgress | None = None,
+) -> Summary:
+    """Run cells in their order, finished ones not again. Running it again goes on where it stopped.
+
+    The first Ctrl-C (or SIGTERM) has running cells end their epoch, save and stop; the second kills them.
+
+    Args:
+        cells: which.
+        folder: where results and work are.
+        settings: how; None is one process per core of this machine.
+        progress: shows what goes on; None shows plain lines.
+
+    Returns:
+        What became of each cell.
+
+    Example:
+        >>> from inbounds.study import select
+        >>> summary = run_study(select(["standard-hopper-ppo-beta"]), StudyFolder())  # in the project's folder
+        >>> summary.reports["standard-hopper-ppo-beta"].outcome
+        'was finished'
+    """
+    settings = settings or Settings()
+    with progress or StudyProgress(cells, folder) as shown:
+        if settings.scheduler is not None:
+            from inbounds.study.running.cluster import run_on_cluster
+
+            return run_on_cluster(cells, folder, settings, shown)
+        return _LocalRun(cells, folder, settings, shown).run()
+
+
+class _Running(NamedTuple):
+    cell: Cell
+    process: SpawnProcess
+    results: Connection
+
+
+class _LocalRun:
+    """The parent of the processes."""
+
+    def __init__(
+        self, cells: Sequence[Cell], folder: StudyFolder, settings: Settings, progress: StudyProgress
+    ) -> None:
+        self.folder, self.settings, self.progress = folder, settings, progress
+        self.waiting = deque(cells)
+        self.running: list[_Running] = []
+        self.reports: dict[str, Report] = {}
+        self.deaths: dict[str, int] = {}
+        self.jobs = settings.jobs or _cores()
+        minutes = settings.max_minutes
+        self.deadline = float("inf") if minutes is None else time.time() + 60 * minutes
+        self.signal = 0
+
+    def run(self) -> Summary:
+        """Start, watch and end processes until nothing is left to do."""
+        with self._listening():
+            try:
+                while self.waiting or self.running:
+                    if self.signal or time.time() > self.deadline:
+                        self.waiting.clear()
+                    while self.waiting and len(self.running) < self.jobs and not self.signal:
+                        self._start(self.waiting.popleft())
+                    # A report that is larger than the pipe holds its process until it is read.
+                    ends = [end for r in self.running for end in (r.results, r.process.sentinel)]
+                    ready = multiprocessing.connection.wait(ends, timeout=LOOK_EVERY)
+                    for running in [r for r in self.running if {r.results, r.process.sentinel} & {*ready}]:
+                        self._end(running)
+                    self.progress.update([r.cell for r in self.running])
+            finally:
+                for running in self.running:  # only after an error here, or a second Ctrl-C
+                    running.process.kill()
+                    running.process.join()
+        return Summary(self.reports, self.signal)
+
+    def _start(self, cell: Cell) -> None:
+        try:
+            if self.folder.state(cell) == "finished":
+                return self._report(cell, Report("was finished"))
+        except OSError as error:
+            return self._report(cell, Report("failed", f"{error}: {OTHER_FOLDERS}"))
+        context = multiprocessing.get_context("spawn")  # a fork would inherit torch's threads
+        receiver, sender = context.Pipe(duplex=False)
+        arguments = (cell, self.folder, self.settings.nice, self.deadline, os.getpid(), sender)
+        process = context.Process(target=_run_in_child, args=arguments, name=cell.id)
+        with _lean(), _signals_held():
+            if not self.signal:  # one that came just now found nothing of this cell to stop
+                process.start()
+                self.running.append(_Running(cell, process, receiver))
+        sender.close()
+        return None
+
+    def _end(self, running: _Running) -> None:
+        cell, process, results = running
+        self.running.remove(running)
+        try:
+            report, warned = results.recv()
+        except (EOFError, OSError):  # it died before its report, or in the middle of it
+            process.join()
+            report, warned = self._death(cell, process.exitcode or 0), []
+        process.join()
+        results.close()
+        for message in warned:
+            self.progress.say(f"{cell.id}: {message}")
+        if report is not None:
+            self._report(cell, report)
+
+    def _death(self, cell: Cell, code: int) -> Report | None:
+        """Have the cell gone on with, a few times; then let somebody look."""
+        if self.signal:
+            return Report("stopped")
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        self.deaths[cell.id] = self.deaths.get(cell.id, 0) + 1
+        if self.deaths[cell.id] <= RETRIES:
+            self.progress.say(f"{cell.id}: its process died ({how}); going on from its last checkpoint")
+            self.waiting.appendleft(cell)
+            return None
+        return Report(
+            "died", f"its process died ({how}), as when memory runs out: run again, perhaps with fewer --jobs"
+        )
+
+    def _report(self, cell: Cell, report: Report) -> None:
+        self.reports[cell.id] = report
+        self.progress.done(cell, report.outcome, report.message)
+        if report.outcome == "disk full":  # for the next cell too
+            self.waiting.clear()
+        wanted = report.outcome == "finished" and self.settings.commit
+        if wanted and (complaint := commit_cell(cell, self.folder)):
+            self.progress.say(complaint)
+
+    @contextlib.contextmanager
+    def _listening(self) -> Iterator[None]:
+        """Take signals for the wish to stop, and hand them on to the processes."""
+
+        def take(number: int, frame: FrameType | None) -> None:
+            if self.signal:
+                raise KeyboardInterrupt
+            self.signal = number
+            self.progress.say("stopping after the epochs under way; again to stop at once")
+            for running in self.running:
+                running.process.terminate()
+
+        with handling(take):
+            yield
+
+
+@contextlib.contextmanager
+def handling(take: Any) -> Iterator[None]:
+    """Handle the signals that ask to stop; does nothing outside the main thread, which gets no signals."""
+    try:
+        before = {number: signal.signal(number, take) for number in SIGNALS}
+    except ValueError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _run_in_child(
+    cell: Cell, folder: StudyFolder, nice: int, deadline: float, parent: int, results: Connection
+) -> None:
+    """A process: run the cell, send what became of it and the warnings on the way."""
+    wish: list[int] = []
+    with handling(lambda number, frame: wish.append(number)):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        os.nice(nice)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            # A parent that was killed is a wish to stop, too: whoever comes next should find the cores free.
+            report = attempt(cell, folder, lambda: bool(wish) or os.getppid() != parent, deadline)
+        # A parent that is gone reads nothing.
+        with contextlib.suppress(BrokenPipeError):
+            results.send((report, _each_once([str(warning.message) for warning in caught])))
+
+
+def _each_once(messages: Sequence[str]) -> list[str]:
+    """Different messages, the first ones; how many more there were is said."""
+    different = list(dict.fromkeys(messages))
+    more = len(different) - MOST_WARNINGS
+    return [*different[:MOST_WARNINGS], *([f"and {more} more warnings"] if more > 0 else [])]
+
+
+def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Report:
+    """Run a cell, whatever happens, and report it."""
+    try:
+        return Report(run_cell(cell, folder, stop=stop, deadline=deadline))
+    except ClaimedError as error:
+        return Report("claimed", str(error))
+    except DiskFullError as error:
+        return Report("disk full", str(error))
+    except (StudyError, BackendError) as error:
+        return Report("failed", str(error))
+    except OSError as error:
+        return Report("failed", f"{error}: {OTHER_FOLDERS}")
+    except Exception:
+        return Report("failed", f"a fault of the program, please report it:\n{traceback.format_exc()}")
+
+
+def commit_cell(cell: Cell, folder: StudyFolder) -> str:
+    """Commit the files of a finished cell, and nothing else.
+
+    Returns:
+        What went wrong; empty if nothing did.
+    """
+    paths = [str(path.resolve()) for path in (*folder.files(cell), folder.results / "checksums.txt")]
+    git = ["git", "-C", str(folder.results)]
+    try:
+        for command in (["add", "--", *paths], ["commit", "-m", f"Add study cell {cell.id}", "--", *paths]):
+            subprocess.run([*git, *command], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        said = getattr(error, "stderr", "") or error
+        return f"{cell.id} is finished, but git did not commit it ({said}): commit it by hand"
+    return ""
+
+
+def _cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def _signals_held() -> Iterator[None]:
+    """Have signals wait, in processes that start now until they can handle them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _lean() -> Iterator[None]:
+    """Have processes that start now use one thread, also before torch is told so, and give memory back."""
+    before = {name: os.environ.get(name) for name in ENVIRONMENT}
+    os.environ.update(ENVIRONMENT)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

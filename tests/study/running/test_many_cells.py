@@ -1,0 +1,364 @@
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+from rich.console import Console
+
+from inbounds.cli.studying import study
+from inbounds.learning.storage import checkpoint
+from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
+from inbounds.study.running.cell_lock import Claim, read_claim
+from inbounds.study.running.many_cells import commit_cell
+from inbounds.study.running.progress import StudyProgress, cell_status, status_table
+from inbounds.study.running.verify import check_sums, first_mismatch
+from inbounds.study.store import read_metadata
+from tests.study.small import folder_in, small_cell
+
+RUN = """
+import sys
+from pathlib import Path
+from inbounds.study import Settings, run_study
+from tests.study.small import folder_in, small_cell
+
+if __name__ == "__main__":
+    cells = [small_cell(family=family, epochs=EPOCHS) for family in ("gaussian", "beta", "logit-normal")]
+    summary = run_study(cells, folder_in(Path(sys.argv[1])), Settings(jobs=int(sys.argv[2])))
+    sys.exit(128 + summary.signal if summary.signal else bool(summary.failed))
+"""
+
+
+def cells_of(epochs: int) -> list[Cell]:
+    return [small_cell(family=family, epochs=epochs) for family in ("gaussian", "beta", "logit-normal")]
+
+
+def start(path: Path, epochs: int, jobs: int = 2) -> subprocess.Popen[str]:
+    """A study in a process of its own, as a shell starts it: in its own process group."""
+    script = path / "script.py"
+    script.write_text(RUN.replace("EPOCHS", str(epochs)))
+    root = Path(__file__).parents[2]
+    return subprocess.Popen(
+        [sys.executable, str(script), str(path), str(jobs)],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run_script(script: str, folder: Path, timeout: float) -> subprocess.CompletedProcess[str]:
+    """A script in a process of its own, with the folder as its argument, to its end."""
+    path, root = folder / "script.py", Path(__file__).parents[2]
+    path.write_text(script)
+    return subprocess.run(
+        [sys.executable, str(path), str(folder)],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+def wait_until(true: Callable[[], object], seconds: float = 120) -> None:
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, "it never came true"
+        time.sleep(0.02)
+
+
+def alone(cell: Cell, path: Path) -> pa.Table:
+    """The rows of a cell that nothing ever happened to."""
+    folder = folder_in(path / "alone")
+    run_cell(cell, folder)
+    return read_cell(folder.cell_file(cell))
+
+
+def has_checkpoint(folder: StudyFolder, cell: Cell) -> bool:
+    return (folder.work_of(cell) / checkpoint.FILE_NAME).exists()
+
+
+def quiet(cells: list[Cell], folder: StudyFolder) -> tuple[StudyProgress, io.StringIO]:
+    said = io.StringIO()
+    return StudyProgress(cells, folder, Console(file=said, width=200)), said
+
+
+def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path) -> None:
+    cell, folder = small_cell(epochs=30), folder_in(tmp_path)
+    process = start(tmp_path, 30, jobs=1)
+    wait_until(lambda: has_checkpoint(folder, cell))
+    pid = (read_claim(folder.work_of(cell)) or {})["pid"]
+    assert pid != process.pid
+    os.kill(pid, signal.SIGKILL)
+    wait_until(
+        lambda: has_checkpoint(folder, cells_of(30)[1])
+    )  # the next cell is under way: the first one is done
+    os.killpg(process.pid, signal.SIGKILL)  # and now all of it, as when the machine goes down
+    said, _ = process.communicate()
+    assert f"{cell.id}: its process died (SIGKILL); going on from its last checkpoint" in said
+    assert first_mismatch(alone(cell, tmp_path), read_cell(folder.cell_file(cell))) == ""
+    sessions = read_metadata(folder.cell_file(cell))["sessions"]
+    assert [session["from_epoch"] % 10 for session in sessions] == [0, 0]
+    assert sessions[1]["from_epoch"] > 0
+    assert run_cell(cells_of(30)[1], folder) == "finished"  # the claim of the dead falls at once
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signal.Signals) -> None:
+    folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
+    process = start(tmp_path, 100_000, jobs=1)
+    wait_until(lambda: (read_claim(folder.work_of(cell)) or {}).get("epoch"))
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)  # as a terminal does
+    else:
+        process.send_signal(number)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert "stopping after the epochs under way" in said
+    assert f"{cell.id}: stopped" in said
+    assert "Traceback" not in said
+    assert has_checkpoint(folder, cell)
+    assert read_claim(folder.work_of(cell)) is None
+
+
+@pytest.mark.slow
+def test_processes_of_a_parent_that_was_killed_stop(tmp_path: Path) -> None:
+    folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
+    process = start(tmp_path, 100_000, jobs=1)
+    wait_until(lambda: (read_claim(folder.work_of(cell)) or {}).get("epoch"))
+    process.kill()
+    wait_until(lambda: read_claim(folder.work_of(cell)) is None, seconds=30)
+    assert has_checkpoint(folder, cell)
+    process.communicate()
+
+
+@pytest.mark.slow
+def test_two_runs_on_one_folder_share_the_work(tmp_path: Path) -> None:
+    folder, runs = folder_in(tmp_path), [start(tmp_path, 60) for _ in range(2)]
+    said = [run.communicate(timeout=300)[0] for run in runs]
+    assert [run.returncode for run in runs] == [0, 0], said
+    for cell in cells_of(60):
+        assert sum(f"{cell.id}: finished" in text for text in said) == 1
+        assert first_mismatch(alone(cell, tmp_path), read_cell(folder.cell_file(cell))) == ""
+        assert len(read_metadata(folder.cell_file(cell))["sessions"]) == 1
+    assert all(finding.ok for finding in check_sums(folder))
+
+
+@pytest.mark.slow
+def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) -> None:
+    script = textwrap.dedent("""
+        import os, signal, sys, threading, time
+        from pathlib import Path
+        from distributed import LocalCluster
+        from inbounds.study import Settings, run_study
+        from inbounds.study.running.cell_lock import read_claim
+        from inbounds.learning.storage import checkpoint
+        from tests.study.small import folder_in
+        from tests.study.running.test_many_cells import cells_of
+
+        def kill(folder, cell):
+            while not (folder.work_of(cell) / checkpoint.FILE_NAME).exists():
+                time.sleep(0.02)
+            os.kill(read_claim(folder.work_of(cell))["pid"], signal.SIGKILL)
+
+        if __name__ == "__main__":
+            cells, folder = cells_of(100), folder_in(Path(sys.argv[1]))
+            with LocalCluster(
+                n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, protocol="tcp"
+            ) as cluster:
+                killer = threading.Thread(target=kill, args=(folder, cells[0]))
+                killer.start()
+                summary = run_study(cells, folder, Settings(scheduler=cluster.scheduler_address))
+                killer.join()
+            print(sorted(report.outcome for report in summary.reports.values()))
+    """)
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    done = run_script(script, tmp_path, timeout=400)
+    assert "['finished', 'finished', 'finished']" in done.stdout, done.stdout + done.stderr
+    folder = folder_in(tmp_path)
+    for cell in cells_of(100):
+        assert first_mismatch(alone(cell, tmp_path), read_cell(folder.cell_file(cell))) == ""
+    sessions = read_metadata(folder.cell_file(cells_of(100)[0]))["sessions"]
+    assert len(sessions) == 2
+    assert sessions[1]["from_epoch"] > 0
+
+
+def a_run(tmp_path: Path, body: str) -> str:
+    """What a study says whose cells are replaced by a few lines: `attempt(cell, folder, stop, deadline)`."""
+    script = textwrap.dedent("""
+        import os, signal, sys, time, warnings
+        from pathlib import Path
+        from inbounds.study.running import many_cells
+        from tests.study.small import folder_in
+        from tests.study.running.test_many_cells import cells_of
+
+        LINES
+
+        run.attempt = attempt  # a spawned process imports this module again
+
+        if __name__ == "__main__":
+            prepare()
+            summary = run.run_study(cells_of(1), folder_in(Path(sys.argv[1])), run.Settings(jobs=2))
+            print(summary.signal, sorted(report.outcome for report in summary.reports.values()))
+    """).replace("LINES", textwrap.dedent(body))
+    done = run_script(script, tmp_path, timeout=100)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            for i in range(3000):
+                warnings.warn(f"warning {i % 1000} " + 10_000 * "-")  # the first twenty are more than a pipe holds
+            return run.Report("finished")
+
+        def prepare():
+            pass
+        """,
+    )
+    assert "0 ['finished', 'finished', 'finished']" in said
+    assert said.count("warning 7 ") == 3
+    assert said.count("and 980 more warnings") == 3
+
+
+def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            end = time.monotonic() + 60
+            while time.monotonic() < end and not stop():
+                time.sleep(0.05)
+            return run.Report("stopped" if stop() else "never told")
+
+        def prepare():
+            real, asked = run.StudyFolder.state, []
+
+            def state(folder, cell):
+                asked.append(cell)
+                if len(asked) == 2:  # the first cell runs, the second is about to
+                    os.kill(os.getpid(), signal.SIGTERM)
+                return real(folder, cell)
+
+            run.StudyFolder.state = state
+        """,
+    )
+    assert f"{signal.SIGTERM.value} ['stopped']" in said
+
+
+def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
+    said = a_run(
+        tmp_path,
+        """
+        def attempt(cell, folder, stop, deadline):
+            return run.Report("finished")
+
+        def prepare():
+            real = run.StudyFolder.state
+
+            def state(folder, cell):
+                if cell.family == "beta":
+                    raise PermissionError("not yours")
+                return real(folder, cell)
+
+            run.StudyFolder.state = state
+        """,
+    )
+    assert "not yours: choose other folders" in said
+    assert "0 ['failed', 'finished', 'finished']" in said
+
+
+def test_no_scheduler_there_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    where = ["--results", str(tmp_path / "r"), "--work", str(tmp_path / "w")]
+    assert study(["run", "standard-ant-*", *where, "--scheduler", "nonsense://127.0.0.1:1"]) == 1
+    assert "no Dask scheduler answers at 'nonsense://127.0.0.1:1'" in capsys.readouterr().err
+
+
+def test_failures_are_reported_and_the_others_go_on(tmp_path: Path) -> None:
+    folder, (broken, good) = folder_in(tmp_path), cells_of(1)[:2]
+    folder.cell_file(broken).parent.mkdir(parents=True)
+    folder.cell_file(broken).write_text("damaged")
+    run_cell(good, folder)
+    progress, said = quiet([broken, good], folder)
+    summary = run_study([broken, good], folder, Settings(jobs=1), progress)
+    outcomes = {name: report.outcome for name, report in summary.reports.items()}
+    assert outcomes == {broken.id: "failed", good.id: "was finished"}
+    assert list(summary.failed) == [broken.id]
+    assert f"{broken.id}: failed: " in said.getvalue()
+    assert "restore it (git checkout" in said.getvalue()
+
+
+def test_no_cell_is_started_when_time_is_up(tmp_path: Path) -> None:
+    folder, cells = folder_in(tmp_path), cells_of(1)
+    assert run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0]).reports == {}
+
+
+def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, cells = folder_in(tmp_path), cells_of(1)
+    run_cell(cells[0], folder)
+    run_cell(small_cell(family="beta", epochs=5), folder, stop=lambda: True)
+    with Claim.take(folder.work_of(cells[2])):
+        assert [cell_status(cell, folder) for cell in cells] == ["finished", "begun", "running"]
+        Console(width=100).print(status_table(cells, folder))
+    assert re.search(r"test\s+│ Swimmer │ 1\s+│ 1\s+│ 1\s+│\s+│\s+│", capsys.readouterr().out)
+
+
+def test_commit_takes_the_cell_and_nothing_else(tmp_path: Path) -> None:
+    folder, (cell, other, _) = folder_in(tmp_path), cells_of(1)
+
+    def git(*args: str) -> str:
+        return subprocess.run(
+            ["git", "-C", str(tmp_path), *args], capture_output=True, text=True, check=True
+        ).stdout
+
+    git("init")
+    for key, value in (("user.name", "Test"), ("user.email", "test@example.org")):
+        git("config", key, value)
+    run_cell(cell, folder)
+    (tmp_path / "staged").touch()
+    git("add", "staged")
+    assert commit_cell(cell, folder) == ""
+    assert git("show", "--name-only", "--format=%s").split("\n") == [
+        f"Add study cell {cell.id}",
+        "",
+        f"results/cells/{cell.id}.parquet",
+        "results/checksums.txt",
+        "",
+    ]
+    assert "did not commit it" in commit_cell(other, folder)
+
+
+def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert study(["status", "no-such-cell"]) == 2
+    assert "no cell matches no-such-cell: use an arm" in capsys.readouterr().err
+    assert study(["verify", "--results", str(tmp_path)]) == 1
+    assert "0 of 0 files" in capsys.readouterr().out
+    for wrong in ("--jobs 0", "--nice 20"):
+        assert study(["run", "standard", *wrong.split()]) == 2
+        assert f"{wrong.split()[0][2:]} must be" in capsys.readouterr().err
+    for command in ("verify", "ledger"):
+        assert study([command, "--results", str(tmp_path / "elsewhere")]) == 2
+        assert "go to the source tree, or name it with --results" in capsys.readouterr().err
+    assert study(["status", "--results", str(tmp_path / "elsewhere")]) == 0
+    assert "go to the source tree" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("settings", [{"jobs": 0}, {"nice": 20}])
+def test_settings_are_checked(settings: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match=r"must be"):
+        Settings(**settings)  # type: ignore[arg-type]
