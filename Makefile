@@ -33,7 +33,7 @@ check: setup  ## format, lint, types, doctests, stored notebooks
 format: setup  ## let ruff format the code, and strip pictures from the stored notebooks
 	@$(PY) -m ruff format . && $(PY) -m ruff check --fix . && $(PY) tools/notebook_hook.py --write
 
-notebooks: setup  ## execute notebooks and store their text outputs  (NB=notebooks/01_….ipynb for some)
+notebooks: setup  ## execute notebooks and store their text outputs  (NB=notebooks/ppo.ipynb for some)
 	@$(PY) tools/execute_notebooks.py $(NB)
 
 pages: book  ## open every built page in headless Chromium and check it

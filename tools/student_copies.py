@@ -14,9 +14,11 @@ import copy
 import hashlib
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import nbformat
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER = ".handed-out.json"
@@ -84,11 +86,23 @@ def written(path: Path) -> str:
         raise ValueError(f"{path.name}: {error}") from error
 
 
-def hand_out(chapters: Path, folder: Path) -> dict[str, str]:
+def chapters_in_order(toc: Path = ROOT / "_toc.yml") -> dict[str, Path]:
+    """The chapters as a class reads them: ``01_actions_have_bounds.ipynb`` and so on, and the book's notebook of each.
+
+    Args:
+        toc: the book's table of contents, at its root. A file has no number of its own there: chapters move.
+    """
+    parts = yaml.safe_load(toc.read_text(encoding="utf8"))["parts"]
+    files = [chapter["file"] for part in parts if part.get("numbered") for chapter in part["chapters"]]
+    notebooks = [toc.parent / f"{file}.ipynb" for file in files]
+    return {f"{number:02}_{notebook.name}": notebook for number, notebook in enumerate(notebooks, 1)}
+
+
+def hand_out(chapters: Mapping[str, Path], folder: Path) -> dict[str, str]:
     """Put a copy of every chapter into a student's folder, except over what the student has changed.
 
     Args:
-        chapters: folder of the book's notebooks.
+        chapters: name in the student's folder → the book's notebook.
         folder: the student's; made if it is not there.
 
     Returns:
@@ -99,20 +113,18 @@ def hand_out(chapters: Path, folder: Path) -> dict[str, str]:
     ledger_file = folder / LEDGER
     ledger = read_ledger(ledger_file)
     outcome = {}
-    for chapter in sorted(chapters.glob("[0-9]*.ipynb")):
-        ours, theirs = written(chapter), folder / chapter.name
+    for name, chapter in chapters.items():
+        ours, theirs = written(chapter), folder / name
         before = digest(theirs.read_text(encoding="utf8")) if theirs.exists() else None
         if before == digest(ours):  # whatever the ledger says of it: nothing is the student's own
-            ledger[chapter.name] = before
-        if before is not None and before != ledger.get(chapter.name):
-            outcome[chapter.name] = "kept" if digest(ours) == ledger.get(chapter.name) else "outdated"
+            ledger[name] = before
+        if before is not None and before != ledger.get(name):
+            outcome[name] = "kept" if digest(ours) == ledger.get(name) else "outdated"
             continue
-        outcome[chapter.name] = (
-            "new" if before is None else "unchanged" if before == digest(ours) else "updated"
-        )
+        outcome[name] = "new" if before is None else "unchanged" if before == digest(ours) else "updated"
         if before != digest(ours):
             theirs.write_text(ours, encoding="utf8")
-        ledger[chapter.name] = digest(ours)
+        ledger[name] = digest(ours)
     ledger_file.write_text(json.dumps(ledger, indent=1) + "\n", encoding="utf8")
     return outcome
 
@@ -158,7 +170,7 @@ def main() -> int:
     )
     parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "lab")
     folder = parser.parse_args().folder
-    for name, state in hand_out(ROOT / "notebooks", folder).items():
+    for name, state in hand_out(chapters_in_order(), folder).items():
         note = {
             "kept": " (you changed it)",
             "outdated": " (you changed it; rename yours to get the book's newer version)",

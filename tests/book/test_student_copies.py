@@ -141,28 +141,43 @@ def test_the_tag_or_the_place_is_enough() -> None:
 def test_handing_out_never_takes_a_students_work(tmp_path: Path) -> None:
     chapters, folder = tmp_path / "notebooks", tmp_path / "lab"
     chapters.mkdir()
-    chapter, theirs = chapters / "01_a.ipynb", folder / "01_a.ipynb"
+    chapter, theirs = chapters / "a.ipynb", folder / "01_a.ipynb"
+    copies = {theirs.name: chapter}
     notebook = exercise()
     nbformat.write(notebook, chapter)
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "new"}
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "unchanged"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "new"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "unchanged"}
 
     notebook.cells[0].source += "\nA better sentence."
     nbformat.write(notebook, chapter)
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "updated"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "updated"}
     assert "A better sentence." in theirs.read_text()
 
     work = theirs.read_text().replace("return ...", "return 1")
     theirs.write_text(work)
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "kept"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "kept"}
     notebook.cells[0].source += "\nA still better sentence."
     nbformat.write(notebook, chapter)
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "outdated"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "outdated"}
     assert theirs.read_text() == work
 
     theirs.rename(folder / "mine.ipynb")
-    assert tool.hand_out(chapters, folder) == {"01_a.ipynb": "new"}
+    assert tool.hand_out(copies, folder) == {"01_a.ipynb": "new"}
     assert "A still better sentence." in theirs.read_text()
+
+
+def test_chapters_are_numbered_as_the_book_orders_them(tmp_path: Path) -> None:
+    toc = tmp_path / "_toc.yml"
+    toc.write_text(
+        "root: notebooks/front\nparts:\n"
+        "  - chapters: [{file: book/preface}]\n"
+        "  - numbered: 2\n    chapters: [{file: notebooks/b}, {file: notebooks/a}]\n"
+        "  - numbered: 2\n    chapters: [{file: notebooks/c}]\n"
+    )
+    found = tool.chapters_in_order(toc)
+    assert list(found) == ["01_b.ipynb", "02_a.ipynb", "03_c.ipynb"]
+    assert found["02_a.ipynb"] == tmp_path / "notebooks" / "a.ipynb"
+    assert all(path.is_file() for path in tool.chapters_in_order().values())
 
 
 def test_downloads_are_student_copies(tmp_path: Path) -> None:
@@ -184,18 +199,19 @@ def test_downloads_are_student_copies(tmp_path: Path) -> None:
 def test_a_lost_or_garbled_ledger_costs_no_work(harm: bytes | None, tmp_path: Path, capsys) -> None:
     chapters, folder = tmp_path / "notebooks", tmp_path / "lab"
     chapters.mkdir()
-    for name in ("01_a.ipynb", "02_b.ipynb"):
-        nbformat.write(exercise(), chapters / name)
-    tool.hand_out(chapters, folder)
+    copies = {name: chapters / name for name in ("01_a.ipynb", "02_b.ipynb")}
+    for chapter in copies.values():
+        nbformat.write(exercise(), chapter)
+    tool.hand_out(copies, folder)
     work = (folder / "02_b.ipynb").read_text().replace("return ...", "return 1")
     (folder / "02_b.ipynb").write_text(work)
     if harm is None:
         (folder / tool.LEDGER).unlink()
     else:
         (folder / tool.LEDGER).write_bytes(harm)
-    found = tool.hand_out(chapters, folder)
+    found = tool.hand_out(copies, folder)
     assert found == {"01_a.ipynb": "unchanged", "02_b.ipynb": "outdated"}
     assert ("is garbled and written anew" in capsys.readouterr().err) is (harm is not None)
     assert (folder / "02_b.ipynb").read_text() == work
-    assert tool.hand_out(chapters, folder)["01_a.ipynb"] == "unchanged"  # with the new ledger
+    assert tool.hand_out(copies, folder)["01_a.ipynb"] == "unchanged"  # with the new ledger
     assert list(json.loads((folder / tool.LEDGER).read_text())) == ["01_a.ipynb"]
