@@ -90,7 +90,7 @@ def test_what_is_left_needs_nothing_from_a_solution(path: Path) -> None:
 def exercise() -> nbformat.NotebookNode:
     """A chapter of one exercise; its markers share their cells with other text, as they do in the book."""
     solution = new_code_cell("def mass_outside(*arguments):\n    return 0.5", metadata={"tags": ["solution"]})
-    grader = "from inbounds.book import graders\ngraders.mass_outside(mass_outside)"
+    grader = "from inbounds.book.exercises import actions_have_bounds as graders\ngraders.mass_outside(mass_outside)"
     return new_notebook(
         cells=[
             new_markdown_cell(
