@@ -476,7 +476,7 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "the ceiling forgets one side",
-        "study/statistics/covering.py",
+        "study/statistics/interval_coverage.py",
         "2.0 ** (1 - n)",
         "2.0 ** (-n)",
         "tests/study/test_statistics.py::test_few_seeds_cover_no_more_than_their_ceiling",
@@ -630,21 +630,21 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "half of a gap is all of it",
-        "study/ledger/halves.py",
+        "study/ledger/half_of_a_gap.py",
         "([a, b, c, d], [1, -1, -0.5, 0.5])",
         "([a, b, c, d], [1, -1, -1, 1])",
         "tests/study/test_ledger.py::test_half_of_a_gap",
     ),
     Mutant(
         "a gap that is not clear waits for cells that cannot matter",
-        "study/ledger/halves.py",
+        "study/ledger/half_of_a_gap.py",
         "    if not gap.low > 0:",
         "    if now is not None and not gap.low > 0:",
         "tests/study/test_ledger.py::test_a_gap_that_is_not_clear_is_moot_whatever_is_left_of_it",
     ),
     Mutant(
         "one group counts as two",
-        "study/ledger/halves.py",
+        "study/ledger/half_of_a_gap.py",
         "one_base=now[1] == before[1]",
         "one_base=False",
         "tests/study/test_ledger.py::test_a_group_in_both_gaps_is_drawn_once",

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from inbounds import learning
 from inbounds.study import Cell, StudyFolder
-from inbounds.study.grid import FAMILIES
+from inbounds.study.grid import COMPARED
 from inbounds.study.running.measure import MEASURE_EVERY
 from inbounds.study.running.one_cell import RETURNS
 from inbounds.study.running.provenance import provenance
@@ -19,7 +19,7 @@ WAYS = ("mean", "median", "mode", "sample")
 
 def level_of(cell: Cell) -> float:
     """Where a made-up cell's mean return ends: families, robots and variants differ."""
-    place = (*FAMILIES, "clipped-gaussian").index(cell.family)
+    place = (*COMPARED, "clipped-gaussian").index(cell.family)
     return (
         1000.0 + 250 * place + 100 * len(cell.robot) - 20 * len(cell.variant) - 300 * (cell.arm == "printed")
     )

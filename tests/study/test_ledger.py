@@ -30,8 +30,8 @@ from inbounds.study.ledger import (
     possible_verdicts,
 )
 from inbounds.study.ledger.evidence import MARGIN, combination, costs, equals, side
-from inbounds.study.ledger.halves import half_left
-from inbounds.study.ledger.naming import squash
+from inbounds.study.ledger.half_of_a_gap import half_left
+from inbounds.study.ledger.shared_names import squash
 from inbounds.study.ledger.verdicts import STATES, State
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import Comparison, Estimate

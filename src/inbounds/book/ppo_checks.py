@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from inbounds.learning.families import NORMAL, Limits
 from inbounds.learning.families.gaussian import normal_entropy
 
-__all__ = ["CHECKS", "GAUSSIAN", "Law", "Loss", "Scene", "policy_loss"]
+__all__ = ["CHECKS", "GAUSSIAN", "Loss", "Scene", "SceneLaw", "policy_loss"]
 
 OBS, ACT, STEPS = 3, 2, 64
 EPSILON = 0.2
@@ -28,8 +28,8 @@ Check: TypeAlias = Callable[[Loss], "str | None"]
 """Returns what is wrong, or None."""
 
 
-class Law(NamedTuple):
-    """What PPO asks of a policy family: the chapter's `Law`."""
+class SceneLaw(NamedTuple):
+    """What PPO asks of a policy family: the chapter's `SceneLaw`."""
 
     log_prob: Callable[[Tensor, Tensor], Tensor]
     """Outputs `[B, 2A]` and latents `[B, A]` to `[B]`."""
@@ -37,7 +37,7 @@ class Law(NamedTuple):
     """Outputs `[B, 2A]` to `[B]`."""
 
 
-GAUSSIAN = Law(
+GAUSSIAN = SceneLaw(
     lambda outputs, latent: NORMAL.log_prob(NORMAL.parameters(outputs, Limits()), latent),
     lambda outputs: normal_entropy(NORMAL.parameters(outputs, Limits())),
 )

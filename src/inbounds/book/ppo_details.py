@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.study import StudyFolder, analysis
 from inbounds.study.grid import ARMS
 from inbounds.study.outcomes import Column, Outcomes
@@ -59,7 +59,7 @@ class CostTable:
         if all(cell in (NOT_RUN, NOT_PLANNED) for cells in self.rows.values() for cell in cells):
             details = dict.fromkeys(html.escape(detail) for detail, _ in self.rows)
             return f"<p>Not yet run, on any robot: the study's cells for {', '.join(details)}.</p>"
-        heads = "".join(f"<th scope='col'>{FAMILIES[family].label}</th>" for family in self.families)
+        heads = "".join(f"<th scope='col'>{LOOKS[family].label}</th>" for family in self.families)
         body = "".join(
             f"<tr><th scope='row'>{html.escape(detail)}</th><td>{robot}</td>"
             + "".join(f"<td>{cell}</td>" for cell in cells)
@@ -95,7 +95,7 @@ def what_details_cost(results: str | Path | Outcomes) -> CostTable:
         compared = {(cell.algorithm, cell.family, cell.robot) for cell in planned}
         plain = [c for c in ARMS["standard"] if (c.algorithm, c.family, c.robot) in compared]
         results = Outcomes.read(StudyFolder(Path(results)), [*planned, *plain])
-    families = [family for family in FAMILIES if any(cell.family == family for cell in planned)]
+    families = [family for family in LOOKS if any(cell.family == family for cell in planned)]
     rows = {
         (words, robot): [_cell(results, variant, robot, family) for family in families]
         for variant, words in DETAILS.items()

@@ -26,7 +26,7 @@ import numpy as np
 
 from inbounds.book.drawing import alt_text
 from inbounds.book.report.html import bullets, paragraph, table
-from inbounds.book.report.shown import Shown
+from inbounds.book.report.html_output import Shown
 from inbounds.study.words import percent
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py

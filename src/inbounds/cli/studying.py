@@ -19,7 +19,7 @@ from inbounds.study.outcomes import Outcomes
 from inbounds.study.running.many_cells import Settings, run_study
 from inbounds.study.running.one_cell import StudyError
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
-from inbounds.study.running.verify import Finding, verify
+from inbounds.study.running.verify import Checked, verify
 from inbounds.study.store import StudyFolder
 
 Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...]")]
@@ -232,7 +232,7 @@ def _ledger(command: Ledger, console: Console) -> int:
 
 
 def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
-    def show(finding: Finding) -> None:
+    def show(finding: Checked) -> None:
         mark = "ok" if finding.ok else "WRONG"
         console.print(f"{mark:5} {finding.subject}: {finding.message}", markup=False, soft_wrap=True)
 

@@ -31,7 +31,7 @@ from inbounds.learning.storage.run_store import (
     load_checkpoint,
     save_run,
 )
-from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, differences
+from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields
 from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
 
@@ -232,7 +232,7 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
 
 def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
     """What a `Trainer` would refuse to change in mid-run, as the command line spells it."""
-    different = differences(config, stored, FREE_TO_CHANGE)
+    different = changed_fields(config, stored, FREE_TO_CHANGE)
     if "algorithm_name" in different:  # another algorithm has other options, too
         different = {"algo": different["algorithm_name"]}
     return "; ".join(

@@ -37,7 +37,7 @@ from inbounds.learning.rollout import Collector, Rollout, check_environments
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.files import held
-from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, describe, differences
+from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.robots.registration import TASK_NAMES
 
@@ -188,7 +188,7 @@ class Trainer:
         Raises:
             ValueError: another configuration wrote it; more epochs than planned then are allowed.
         """
-        if different := differences(self.config, state["config"], FREE_TO_CHANGE):
+        if different := changed_fields(self.config, state["config"], FREE_TO_CHANGE):
             changes = "; ".join(f"{name}: {stored} → {ours}" for name, (stored, ours) in different.items())
             raise ValueError(
                 f"the checkpoint belongs to another configuration ({changes}): "

@@ -157,7 +157,7 @@ THESIS = (
 BEYOND = (("trpo", "beta"), ("ppo", "clipped-gaussian"), ("trpo", "clipped-gaussian"))
 LOOKED_INTO = ("matched-noise", f"gamma-{LONG_GAMMA}")
 """Variants of the fourth arm whose final policies are kept: the book looks at how their robots move."""
-FAMILIES = ("gaussian", "beta", "logit-normal")
+COMPARED = ("gaussian", "beta", "logit-normal")
 
 
 def _mechanisms() -> list[Cell]:
@@ -166,10 +166,10 @@ def _mechanisms() -> list[Cell]:
     entropy = [name for name in VARIANTS if name.startswith("entropy-")]
     plan: list[tuple[Sequence[str], Sequence[str], Sequence[str], Sequence[str]]] = [
         # variants, algorithms, families, robots
-        (["matched-noise"], ["ppo"], FAMILIES, ["HalfCheetah", "Hopper", "Swimmer", "Walker2d"]),
+        (["matched-noise"], ["ppo"], COMPARED, ["HalfCheetah", "Hopper", "Swimmer", "Walker2d"]),
         (["raw-cost"], ["ppo"], ["gaussian"], ["HalfCheetah", "Ant"]),
-        (entropy, ["ppo"], FAMILIES, ["HalfCheetah", "Hopper"]),
-        ([f"gamma-{LONG_GAMMA}"], ["ppo", "trpo"], FAMILIES, ["Swimmer"]),
+        (entropy, ["ppo"], COMPARED, ["HalfCheetah", "Hopper"]),
+        ([f"gamma-{LONG_GAMMA}"], ["ppo", "trpo"], COMPARED, ["Swimmer"]),
         (printed, ["ppo"], ["gaussian", "logit-normal"], ["HalfCheetah", "Hopper"]),
     ]
     return [

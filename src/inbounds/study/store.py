@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from inbounds.learning import TrainConfig
 from inbounds.learning.storage.files import DamagedFileError, write_whole
 from inbounds.learning.storage.run_files import METADATA_KEY, metadata_of
-from inbounds.learning.storage.stored_config import differences
+from inbounds.learning.storage.stored_config import changed_fields
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 from inbounds.study.running.cell_lock import file_lock
 
@@ -175,7 +175,7 @@ class StudyFolder:
 
 def is_of(cell: Cell, metadata: Mapping[str, Any]) -> bool:
     """Whether a file that says so much of itself is of a cell, of this version of the study."""
-    return metadata["study_version"] == STUDY_VERSION and not differences(cell.config, metadata["config"])
+    return metadata["study_version"] == STUDY_VERSION and not changed_fields(cell.config, metadata["config"])
 
 
 def sha256(path: Path) -> str:

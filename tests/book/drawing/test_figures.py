@@ -23,8 +23,8 @@ from inbounds.book.drawing import alt_text, figures
 from tests.book.colour_vision import GROUNDS, VISION, cie_lab, contrast, linear_rgb
 
 PALETTES = {
-    "white": ({family: look.color for family, look in figures.FAMILIES.items()}, GROUNDS["white"]),
-    "dark": ({family: look.color_on_dark for family, look in figures.FAMILIES.items()}, GROUNDS["dark"]),
+    "white": ({family: look.color for family, look in figures.LOOKS.items()}, GROUNDS["white"]),
+    "dark": ({family: look.color_on_dark for family, look in figures.LOOKS.items()}, GROUNDS["dark"]),
     "shades": (dict(enumerate(figures.SHADES)), GROUNDS["white"]),
 }
 
@@ -58,17 +58,17 @@ def test_colours_differ_in_greyscale_and_stand_out(palette: str) -> None:
 @pytest.mark.parametrize("vision", VISION)
 def test_no_other_curve_looks_like_a_family(vision: str) -> None:
     """Shades may be as light as a family is, so their colours must differ the more."""
-    for shade, look in itertools.product(figures.SHADES, figures.FAMILIES.values()):
+    for shade, look in itertools.product(figures.SHADES, figures.LOOKS.values()):
         seen = [cie_lab(VISION[vision] @ linear_rgb(color)) for color in (shade, look.color)]
         assert np.linalg.norm(seen[0] - seen[1]) > 20, (shade, look.label)
 
 
 def test_families_differ_in_line_and_marker_too() -> None:
-    looks = figures.FAMILIES.values()
+    looks = figures.LOOKS.values()
     assert (
         len({look.linestyle for look in looks})
         == len({look.marker for look in looks})
-        == len(figures.FAMILIES)
+        == len(figures.LOOKS)
         == 4
     )
 

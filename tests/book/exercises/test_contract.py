@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from inbounds.book import exercises
-from inbounds.book.exercises.judging import Verdict
+from inbounds.book.exercises.judging import Judgement
 from tests.book.exercises import (
     test_actions_have_bounds,
     test_beta_policies,
@@ -48,7 +48,7 @@ GRADERS = [
     for name, grader in inspect.getmembers(importlib.import_module(module.name), inspect.isfunction)
     if grader.__module__ == module.name and not name.startswith("_")
     if list(inspect.signature(grader).parameters) in (["function"], ["make"])
-    if "Verdict" in str(inspect.signature(grader).return_annotation)
+    if "Judgement" in str(inspect.signature(grader).return_annotation)
 ]
 
 
@@ -88,7 +88,7 @@ def test_all_graders_are_found() -> None:
 def test_an_answer_with_a_graph_is_judged_like_any_other(grader: Callable, pack: Callable) -> None:
     """The most common answer of all: a tensor that requires a gradient."""
     verdict = grader(lambda *_, **__: pack(torch.ones(1, dtype=torch.float64, requires_grad=True)))
-    assert isinstance(verdict, Verdict)
+    assert isinstance(verdict, Judgement)
     assert "requires grad" not in verdict.message
 
 

@@ -2,29 +2,29 @@
 
 import pytest
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 SQUARE = [Case((3.0,), 9.0, {"that is the double": 6.0})]
 
 
 @pytest.mark.parametrize("empty", [None, NotImplemented, ...])
 def test_a_function_that_returns_nothing_is_unanswered(empty: object) -> None:
-    assert judge(lambda x: empty, SQUARE, "right").passed is None
+    assert judge_cases(lambda x: empty, SQUARE, "right").passed is None
 
 
 def test_right_known_and_unknown_mistakes() -> None:
-    assert judge(lambda x: x * x, SQUARE, "right").passed is True
-    assert judge(lambda x: 2 * x, SQUARE, "right").message == "that is the double"
-    assert judge(lambda x: x, SQUARE, "right").message == "the value is wrong: expected 9, got 3"
+    assert judge_cases(lambda x: x * x, SQUARE, "right").passed is True
+    assert judge_cases(lambda x: 2 * x, SQUARE, "right").message == "that is the double"
+    assert judge_cases(lambda x: x, SQUARE, "right").message == "the value is wrong: expected 9, got 3"
 
 
 def test_an_exception_is_reported() -> None:
-    verdict = judge(lambda x: x / 0, SQUARE, "right")
+    verdict = judge_cases(lambda x: x / 0, SQUARE, "right")
     assert verdict.passed is False
     assert "ZeroDivisionError" in verdict.message
 
 
 def test_a_verdict_shows_itself() -> None:
-    verdict = Verdict("f", False, "a < b")
+    verdict = Judgement("f", False, "a < b")
     assert repr(verdict) == "✗ not yet: f: a < b"
     assert "a &lt; b" in verdict._repr_html_()

@@ -271,7 +271,7 @@ def test_values_outside_the_sliders_are_refused(mu: float, sigma: float) -> None
 def test_static_figure_shows_the_same_curves() -> None:
     fig = bounded_densities(mu=0.3, sigma=1.0).fallback()
     labels = [line.get_label() for line in fig.axes[0].lines]
-    assert labels == [figures.FAMILIES[family].label for family in ("gaussian", "beta", "logit-normal")]
+    assert labels == [figures.LOOKS[family].label for family in ("gaussian", "beta", "logit-normal")]
     state = run_js('inbounds.models["bounded-densities"]({ mu: 0.3, log_sigma: 0 })')
     for line, family in zip(fig.axes[0].lines, ("gaussian", "beta", "logit-normal"), strict=True):
         x, y = line.get_data()

@@ -124,7 +124,7 @@ def test_static_figure_and_alt_text_say_the_same() -> None:
         "clipped: 0.467 nats",
     ]
     colors = {line.get_color() for ax in fig.axes for line in ax.lines}
-    assert colors == {figures.FAMILIES[family].color for family in MAPS}
+    assert colors == {figures.LOOKS[family].color for family in MAPS}
 
 
 def test_initial_values_are_the_sliders() -> None:

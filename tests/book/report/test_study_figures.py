@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import FAMILIES, png_bytes
+from inbounds.book.drawing.figures import LOOKS, png_bytes
 from inbounds.book.report import study_figures
 from inbounds.book.report.study_figures import Curve
 from inbounds.study import statistics
@@ -50,13 +50,13 @@ def words(fig: Figure) -> str:
 
 
 def test_every_panel_draws_the_curves_and_bands_it_was_given() -> None:
-    cells = {robot: {f: curve(i, robot=r) for i, f in enumerate(FAMILIES)} for r, robot in enumerate(ROBOTS)}
+    cells = {robot: {f: curve(i, robot=r) for i, f in enumerate(LOOKS)} for r, robot in enumerate(ROBOTS)}
     fig = study_figures.learning_curves(cells)
     assert [ax.get_title() for ax in fig.axes] == ROBOTS
     for ax, robot in zip(fig.axes, ROBOTS, strict=True):
-        assert len(ax.collections) == len(FAMILIES)
+        assert len(ax.collections) == len(LOOKS)
         for line, band, (family, given) in zip(ax.lines, ax.collections, cells[robot].items(), strict=True):
-            look = FAMILIES[family]
+            look = LOOKS[family]
             assert np.array_equal(line.get_xydata(), np.stack([STEPS / 1e6, given.estimate.value], -1))
             assert (to_hex(line.get_color()), line.get_linestyle()) == (look.color.lower(), look.linestyle)
             assert line.get_marker() == look.marker
@@ -68,7 +68,7 @@ def test_every_panel_draws_the_curves_and_bands_it_was_given() -> None:
     for text in [
         "return",
         "env steps per seed [millions]",
-        *(look.label for look in FAMILIES.values()),
+        *(look.label for look in LOOKS.values()),
     ]:
         assert text in said
 
@@ -95,17 +95,17 @@ def test_seeds_that_count_although_they_diverged_are_named() -> None:
 
 
 def test_interval_panels_show_value_and_interval_in_the_familys_look() -> None:
-    cells = {robot: {f: estimate(scores(i)) for i, f in enumerate(FAMILIES)} for robot in ROBOTS[:3]}
+    cells = {robot: {f: estimate(scores(i)) for i, f in enumerate(LOOKS)} for robot in ROBOTS[:3]}
     fig = study_figures.interval_panels(cells, xlabel="return")
     assert len(fig.axes) == 3
     for ax in fig.axes:
         bars, markers = ax.lines[::2], ax.lines[1::2]
-        for i, family in enumerate(FAMILIES):
+        for i, family in enumerate(LOOKS):
             given = cells[ROBOTS[0]][family]
             assert bars[i].get_xdata().tolist() == [given.low, given.high]
             assert markers[i].get_xdata().tolist() == [given.value]
-            assert markers[i].get_marker() == FAMILIES[family].marker
-            assert to_hex(markers[i].get_markerfacecolor()) == FAMILIES[family].color.lower()
+            assert markers[i].get_marker() == LOOKS[family].marker
+            assert to_hex(markers[i].get_markerfacecolor()) == LOOKS[family].color.lower()
             assert markers[i].get_ydata()[0] == i
             assert bars[i].get_linestyle() == "-", "a broken bar reads as another interval"
     assert "Marker: IQM. Bar: 95 % bootstrap interval. n = 10 seeds." in words(fig)
@@ -174,12 +174,10 @@ def test_profiles_are_drawn_as_given() -> None:
 def test_nothing_overlaps_or_leaves_the_figure(rows: int, kind: str) -> None:
     robots = ROBOTS[:rows]
     if kind == "curves":
-        fig = study_figures.learning_curves(
-            {r: {f: curve(i) for i, f in enumerate(FAMILIES)} for r in robots}
-        )
+        fig = study_figures.learning_curves({r: {f: curve(i) for i, f in enumerate(LOOKS)} for r in robots})
     elif kind == "bars":
         lost = estimate([np.nan, *scores(0)[1:]], missing="exclude")
-        fig = study_figures.interval_panels({r: dict.fromkeys(FAMILIES, lost) for r in robots})
+        fig = study_figures.interval_panels({r: dict.fromkeys(LOOKS, lost) for r in robots})
     else:
         lost = statistics.difference(
             [np.nan, *scores(0)[1:]], scores(1), np.random.default_rng(0), missing="exclude"
@@ -202,8 +200,8 @@ def test_nothing_overlaps_or_leaves_the_figure(rows: int, kind: str) -> None:
 
 
 def test_an_empty_study_is_a_figure_of_missing_cells() -> None:
-    fig = study_figures.learning_curves({r: dict.fromkeys(FAMILIES) for r in ROBOTS})
-    assert words(fig).count("missing") == len(ROBOTS) * len(FAMILIES)
+    fig = study_figures.learning_curves({r: dict.fromkeys(LOOKS) for r in ROBOTS})
+    assert words(fig).count("missing") == len(ROBOTS) * len(LOOKS)
     assert "No cell is complete yet." in words(fig)
     assert png_bytes(fig).startswith(b"\x89PNG")
 

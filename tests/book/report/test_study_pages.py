@@ -8,8 +8,8 @@ import pytest
 
 from inbounds.book.report import ledger as report_ledger
 from inbounds.book.report import study_pages
+from inbounds.book.report.html_output import Shown
 from inbounds.book.report.results import PUBLISHED, THESIS
-from inbounds.book.report.shown import Shown
 from inbounds.book.report.study_report import GROUPS, write_report
 from inbounds.book.report.words import pair_name, spoken, verdict
 from inbounds.study import analysis, select
@@ -46,7 +46,7 @@ def views(outcomes: Outcomes) -> list[Shown]:
         study_pages.provenance(outcomes),
         study_pages.curves(outcomes, "standard", "ppo"),
         study_pages.endpoints(outcomes, "standard", "ppo"),
-        study_pages.differences(outcomes, "standard", "ppo"),
+        study_pages.difference_table(outcomes, "standard", "ppo"),
         study_pages.inside(outcomes, "standard", "ppo"),
         study_pages.over_all_robots(outcomes, "standard"),
         study_pages.ways(outcomes),
@@ -72,7 +72,7 @@ def test_the_stored_text_does_not_change_when_cells_arrive(nothing: Outcomes, so
 @pytest.mark.slow
 def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path) -> None:
     report = write_report(some, tmp_path / "report.html").read_text(encoding="utf8")
-    for view in (study_pages.state(some), study_pages.differences(some, "standard", "ppo")):
+    for view in (study_pages.state(some), study_pages.difference_table(some, "standard", "ppo")):
         tables = [part for part in view.html.split("\n") if part.startswith('<div class="table"')]
         assert tables
         assert all(table in report for table in tables)

@@ -15,7 +15,7 @@ from inbounds.study.running import cell_lock
 from inbounds.study.running.cell_lock import (
     FILE_NAME,
     SILENCE,
-    Claim,
+    CellLock,
     ClaimedError,
     is_alive,
     read_claim,
@@ -25,8 +25,8 @@ from inbounds.study.running.cell_lock import (
 HOLD = """
 import os, sys
 from pathlib import Path
-from inbounds.study.running.cell_lock import Claim
-Claim.take(Path(sys.argv[1]))
+from inbounds.study.running.cell_lock import CellLock
+CellLock.take(Path(sys.argv[1]))
 print("taken", flush=True)
 sys.stdin.read()
 os._exit(9)
@@ -54,28 +54,28 @@ def test_the_claim_of_a_living_process_stands_and_that_of_a_dead_one_falls(tmp_p
         assert holder.stdout is not None
         assert holder.stdout.readline() == "taken\n"
         with pytest.raises(ClaimedError, match=f"process {holder.pid} on "):
-            Claim.take(tmp_path)
+            CellLock.take(tmp_path)
         holder.kill()
-    with Claim.take(tmp_path):
+    with CellLock.take(tmp_path):
         assert read_claim(tmp_path)["pid"] == os.getpid()  # type: ignore[index]
     assert read_claim(tmp_path) is None
 
 
 def test_another_process_of_the_same_number_is_not_the_holder(tmp_path: Path) -> None:
     write(tmp_path, started="12345")
-    Claim.take(tmp_path).release()
+    CellLock.take(tmp_path).release()
 
 
 def test_another_host_is_believed_for_a_while(tmp_path: Path) -> None:
     write(tmp_path, host="elsewhere", pid=1)
     with pytest.raises(ClaimedError, match="on elsewhere"):
-        Claim.take(tmp_path)
+        CellLock.take(tmp_path)
     write(tmp_path, host="elsewhere", pid=1, renewed=time.time() - SILENCE - 1)
-    Claim.take(tmp_path).release()
+    CellLock.take(tmp_path).release()
 
 
 def test_who_was_taken_over_notices_and_leaves_the_new_holder_alone(tmp_path: Path) -> None:
-    ours = Claim.take(tmp_path)
+    ours = CellLock.take(tmp_path)
     write(tmp_path, host="elsewhere", pid=1)
     for act in (ours.check, ours.renew):
         with pytest.raises(ClaimedError, match="taken over by another process"):
@@ -88,7 +88,7 @@ def test_who_was_taken_over_notices_and_leaves_the_new_holder_alone(tmp_path: Pa
 def test_a_file_cut_short_claims_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE_NAME).write_text(text)
     assert read_claim(tmp_path) is None
-    Claim.take(tmp_path).release()
+    CellLock.take(tmp_path).release()
 
 
 def test_of_many_exactly_one_takes_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +106,7 @@ def test_of_many_exactly_one_takes_over(tmp_path: Path, monkeypatch: pytest.Monk
     def take() -> None:
         start.wait()
         with contextlib.suppress(ClaimedError):
-            taken.append(Claim.take(tmp_path))
+            taken.append(CellLock.take(tmp_path))
 
     threads = [threading.Thread(target=take) for _ in range(8)]
     for thread in threads:
@@ -123,7 +123,7 @@ def test_a_claim_waits_for_whoever_holds_the_lock(tmp_path: Path) -> None:
     with holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == "locked\n"
-        taker = threading.Thread(target=Claim.take, args=(tmp_path,))
+        taker = threading.Thread(target=CellLock.take, args=(tmp_path,))
         taker.start()
         taker.join(0.3)
         assert taker.is_alive()

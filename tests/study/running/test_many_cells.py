@@ -16,7 +16,7 @@ from rich.console import Console
 from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
-from inbounds.study.running.cell_lock import Claim, read_claim
+from inbounds.study.running.cell_lock import CellLock, read_claim
 from inbounds.study.running.many_cells import commit_cell
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
 from inbounds.study.running.verify import check_sums, first_mismatch
@@ -224,7 +224,7 @@ def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
         def attempt(cell, folder, stop, deadline):
             for i in range(3000):
                 warnings.warn(f"warning {i % 1000} " + 10_000 * "-")  # the first twenty are more than a pipe holds
-            return run.Report("finished")
+            return run.CellReport("finished")
 
         def prepare():
             pass
@@ -243,7 +243,7 @@ def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> No
             end = time.monotonic() + 60
             while time.monotonic() < end and not stop():
                 time.sleep(0.05)
-            return run.Report("stopped" if stop() else "never told")
+            return run.CellReport("stopped" if stop() else "never told")
 
         def prepare():
             real, asked = run.StudyFolder.state, []
@@ -265,7 +265,7 @@ def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
         tmp_path,
         """
         def attempt(cell, folder, stop, deadline):
-            return run.Report("finished")
+            return run.CellReport("finished")
 
         def prepare():
             real = run.StudyFolder.state
@@ -312,7 +312,7 @@ def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, cells = folder_in(tmp_path), cells_of(1)
     run_cell(cells[0], folder)
     run_cell(small_cell(family="beta", epochs=5), folder, stop=lambda: True)
-    with Claim.take(folder.work_of(cells[2])):
+    with CellLock.take(folder.work_of(cells[2])):
         assert [cell_status(cell, folder) for cell in cells] == ["finished", "begun", "running"]
         Console(width=100).print(status_table(cells, folder))
     assert re.search(r"test\s+│ Swimmer │ 1\s+│ 1\s+│ 1\s+│\s+│\s+│", capsys.readouterr().out)

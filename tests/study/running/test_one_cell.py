@@ -19,7 +19,7 @@ from inbounds.learning.storage.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, read_cell, run_cell
 from inbounds.study.running import evaluate, one_cell
-from inbounds.study.running.cell_lock import Claim, ClaimedError
+from inbounds.study.running.cell_lock import CellLock, ClaimedError
 from inbounds.study.running.evaluate import generator_of
 from inbounds.study.running.measure import MeasuredTrainer
 from inbounds.study.running.one_cell import DiskFullError
@@ -206,7 +206,7 @@ def test_time_that_is_up_stops_with_a_checkpoint(tmp_path: Path) -> None:
 
 def test_a_claimed_cell_is_left_alone(tmp_path: Path) -> None:
     folder = folder_in(tmp_path)
-    with Claim.take(folder.work_of(small_cell())), pytest.raises(ClaimedError):
+    with CellLock.take(folder.work_of(small_cell())), pytest.raises(ClaimedError):
         run_cell(small_cell(), folder)
 
 

@@ -18,7 +18,7 @@ from inbounds.learning.storage.run_store import save_policies
 from inbounds.study import StudyFolder, read_cell, run_cell, select, store, verify
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running import evaluate
-from inbounds.study.running.verify import TOLERANCE, Finding, check_rerun, first_mismatch
+from inbounds.study.running.verify import TOLERANCE, Checked, check_rerun, first_mismatch
 from tests.cli.small import run
 from tests.study.small import folder_in, small_cell
 from tests.study.synthetic import write_cells
@@ -50,7 +50,7 @@ def folder(done: StudyFolder, tmp_path: Path) -> StudyFolder:
     return folder_in(tmp_path)
 
 
-def bad(findings: list[Finding]) -> list[str]:
+def bad(findings: list[Checked]) -> list[str]:
     return [f"{finding.subject}: {finding.message}" for finding in findings if not finding.ok]
 
 

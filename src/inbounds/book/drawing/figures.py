@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from inbounds.distributions import LogitNormal
 
 __all__ = [
-    "FAMILIES",
+    "LOOKS",
     "MAX_DENSITY",
     "SHADES",
     "STYLE",
@@ -66,7 +66,7 @@ class FamilyStyle:
     """The look of one policy family, the same throughout the book.
 
     Example:
-        >>> FAMILIES["beta"].label
+        >>> LOOKS["beta"].label
         'Beta'
     """
 
@@ -82,7 +82,7 @@ class FamilyStyle:
     """Matplotlib marker."""
 
 
-FAMILIES: Mapping[str, FamilyStyle] = MappingProxyType(
+LOOKS: Mapping[str, FamilyStyle] = MappingProxyType(
     {
         "gaussian": FamilyStyle("Gaussian, clipped", "#A8330A", "#DD5B33", "--", "s"),
         "clipped-gaussian": FamilyStyle("Clipped Gaussian (CAPG)", "#CC7E14", "#FFD394", "-.", "D"),
@@ -171,7 +171,7 @@ def family_style(family: str, *, markers: int | None = None) -> dict[str, Any]:
     """Keyword arguments for ``Axes.plot`` that draw a policy family in its own look.
 
     Args:
-        family: A key of :data:`FAMILIES`.
+        family: A key of :data:`LOOKS`.
         markers: Draw the family's marker at every so many points; None draws a bare line.
 
     Returns:
@@ -184,9 +184,9 @@ def family_style(family: str, *, markers: int | None = None) -> dict[str, Any]:
         >>> family_style("beta")["label"]
         'Beta'
     """
-    if family not in FAMILIES:
-        raise ValueError(f"no policy family {family!r}; choose one of {', '.join(FAMILIES)}")
-    look = FAMILIES[family]
+    if family not in LOOKS:
+        raise ValueError(f"no policy family {family!r}; choose one of {', '.join(LOOKS)}")
+    look = LOOKS[family]
     style: dict[str, Any] = {"color": look.color, "linestyle": look.linestyle, "label": look.label}
     if markers is not None:
         style |= {"marker": look.marker, "markevery": markers}

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["mass_outside"]
 
 
-def mass_outside(function: Callable[..., Any]) -> Verdict:
+def mass_outside(function: Callable[..., Any]) -> Judgement:
     """Judge the probability that some coordinate of a Gaussian action leaves its box."""
 
     def case(loc: Any, scale: Any, low: Any, high: Any) -> Case:
@@ -36,4 +36,4 @@ def mass_outside(function: Callable[..., Any]) -> Verdict:
         case([0.0, 0.0, 1.0], [2.0, 0.1, 1.0], [-1.0, -1.0, 0.0], [1.0, 1.0, 3.0]),
         replace(case([0.0, 0.0], [0.1, 0.1], [-1.0, -1.0], [1.0, 1.0]), mistakes={}, hint=cancelled),
     ]
-    return judge(function, cases, "right, down to the smallest probabilities")
+    return judge_cases(function, cases, "right, down to the smallest probabilities")

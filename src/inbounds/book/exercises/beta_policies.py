@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from scipy import special
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["match_moments", "safe_beta_kl"]
 
@@ -18,7 +18,7 @@ NO_POLICY = math.nan
 """What stands for the reader's None, which the judge would take for an exercise not answered."""
 
 
-def match_moments(function: Callable[..., Any]) -> Verdict:
+def match_moments(function: Callable[..., Any]) -> Judgement:
     """α and β of a Beta policy from its mean and standard deviation; None where no policy has them.
 
     Args:
@@ -72,10 +72,10 @@ def match_moments(function: Callable[..., Any]) -> Verdict:
         possible(4.9, 0.09, 0.0, 5.0),
     ]
     attempt.__name__ = getattr(function, "__name__", "match_moments")
-    return judge(attempt, cases, "right, and it knows what a Beta policy cannot do")
+    return judge_cases(attempt, cases, "right, and it knows what a Beta policy cannot do")
 
 
-def safe_beta_kl(function: Callable[..., Any]) -> Verdict:
+def safe_beta_kl(function: Callable[..., Any]) -> Judgement:
     """KL(old‖new) of two Betas for float32 parameters, where the closed form cancels.
 
     Args:
@@ -110,7 +110,7 @@ def safe_beta_kl(function: Callable[..., Any]) -> Verdict:
         case([[79.0, 70.0, 79.5, 70.0], [60.0, 75.0, 60.0, 75.5], [80.0, 80.0, 79.0, 79.0]], cancelled, 1e-4),
     ]
     returns_float32.__name__ = getattr(function, "__name__", "safe_beta_kl")
-    return judge(returns_float32, cases, "right, also where single precision has nothing left")
+    return judge_cases(returns_float32, cases, "right, also where single precision has nothing left")
 
 
 def double_kl(alpha: Any, beta: Any, alpha_new: Any, beta_new: Any) -> Any:

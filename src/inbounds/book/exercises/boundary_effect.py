@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from scipy import special, stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 
-def capg_score(function: Callable[..., Any]) -> Verdict:
+def capg_score(function: Callable[..., Any]) -> Judgement:
     """The score of a clipped Gaussian at the executed action, for (loc, log scale)."""
 
     def case(action: float, loc: float, scale: float, low: float, high: float, **known: Any) -> Case:
@@ -46,6 +46,6 @@ def capg_score(function: Callable[..., Any]) -> Verdict:
         case(1.0, -4.0, 0.1, -1.0, 1.0, hint=underflow),
         case(-0.4, 4.6, 0.1, -0.4, 0.4, hint=underflow),
     ]
-    return judge(
+    return judge_cases(
         function, cases, "right, on both bounds, between them, and for a bound that is never reached"
     )

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 LEVEL = 0.05
 
 
-def score_sheet(function: Callable[..., Any]) -> Verdict:
+def score_sheet(function: Callable[..., Any]) -> Judgement:
     """Wins, ties and losses of differences after Holm's correction at five per cent."""
 
     def case(gaps: list[float], p_values: list[float], hint: str) -> Case:
@@ -39,7 +39,9 @@ def score_sheet(function: Callable[..., Any]) -> Verdict:
         case([5, 4, 3, 2], [0.011, 0.014, 0.02, 0.9], "Holm's steps are m, m − 1, …, 1"),
         case([1, 2, 3, -4], [0.04, 0.001, 0.03, 0.045], "a smaller p-value that fails stops all larger ones"),
     ]
-    return judge(function, cases, "right: corrected step by step, signs kept, and the first failure stops")
+    return judge_cases(
+        function, cases, "right: corrected step by step, signs kept, and the first failure stops"
+    )
 
 
 def _counts(gaps: list[float], clear: list[bool]) -> list[int]:
@@ -67,7 +69,7 @@ def _without_stop(gaps: list[float], p_values: list[float]) -> list[int]:
     return _counts(gaps, [p * (len(gaps) - order.index(i)) < LEVEL for i, p in enumerate(p_values)])
 
 
-def half_width(function: Callable[..., Any]) -> Verdict:
+def half_width(function: Callable[..., Any]) -> Judgement:
     """Half the width of Student's 95 % interval of the mean over seeds, at each epoch."""
     rng = np.random.default_rng(0)
 
@@ -93,4 +95,6 @@ def half_width(function: Callable[..., Any]) -> Verdict:
         case(10, 6, "one number per epoch is expected, `[E]`"),
         case(4, 3, "it must hold for any number of seeds"),
     ]
-    return judge(function, cases, "right: seeds are the unit, and Student's quantile knows how few they are")
+    return judge_cases(
+        function, cases, "right: seeds are the unit, and Student's quantile knows how few they are"
+    )

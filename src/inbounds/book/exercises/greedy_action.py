@@ -10,13 +10,13 @@ import torch
 from scipy import integrate, stats
 from scipy.special import expit
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 from inbounds.distributions import LogitNormal
 
 __all__ = ["mean_action", "mode_gradient"]
 
 
-def mode_gradient(function: Callable[..., Any]) -> Verdict:
+def mode_gradient(function: Callable[..., Any]) -> Judgement:
     """The derivatives of the logit-normal's mode with respect to μ and σ."""
 
     def case(loc: float, scale: float, low: float, high: float) -> Case:
@@ -42,7 +42,7 @@ def mode_gradient(function: Callable[..., Any]) -> Verdict:
         return Case((loc, scale, low, high), expected, mistakes, rtol=1e-5)
 
     cases = [case(0.3, 0.8, -1.0, 1.0), case(-1.2, 1.3, 0.0, 10.0), case(-0.1, 2.2, -0.4, 0.4)]
-    return judge(function, cases, "right, on both sides of zero and with two peaks")
+    return judge_cases(function, cases, "right, on both sides of zero and with two peaks")
 
 
 def _lower_mode_gradient(loc: float, scale: float, low: float, high: float) -> np.ndarray:
@@ -59,7 +59,7 @@ def _lower_mode_gradient(loc: float, scale: float, low: float, high: float) -> n
     return np.array([1.0, 2 * scale * np.tanh(z / 2)]) * squash / bend
 
 
-def mean_action(function: Callable[..., Any]) -> Verdict:
+def mean_action(function: Callable[..., Any]) -> Judgement:
     """The mean of a logit-normal action on (low, high)."""
 
     def case(loc: float, scale: float, low: float, high: float) -> Case:
@@ -83,4 +83,4 @@ def mean_action(function: Callable[..., Any]) -> Verdict:
         return Case((loc, scale, low, high), low + length * fraction, mistakes, rtol=1e-5)
 
     cases = [case(0.7, 0.9, -1.0, 1.0), case(-0.4, 1.5, 0.0, 3.0), case(2.0, 0.5, -0.4, 0.4)]
-    return judge(function, cases, "right, on every box")
+    return judge_cases(function, cases, "right, on every box")

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["adjust", "final_interval"]
 
 Floats = NDArray[np.float64]
 
 
-def adjust(function: Callable[..., Any]) -> Verdict:
+def adjust(function: Callable[..., Any]) -> Judgement:
     """Holm's adjusted p-values, in the order given; NaN for a test that could not be made."""
 
     def case(p_values: list[float]) -> Case:
@@ -51,7 +51,7 @@ def adjust(function: Callable[..., Any]) -> Verdict:
     first = [0.004, 0.3, 0.011, 0.04, 0.0115, 0.2]
     missing = replace(case([0.02, math.nan, 0.001, 0.3, math.nan, 0.012]), hint="with missing tests (NaN)")
     cases = [case(first), case([0.6, 0.55, 0.01]), missing]
-    return judge(function, cases, "right: in order, never falling, and nobody leaves the count")
+    return judge_cases(function, cases, "right: in order, never falling, and nobody leaves the count")
 
 
 def _benjamini_hochberg(p: Floats, made: NDArray[np.bool_]) -> Floats:
@@ -60,7 +60,7 @@ def _benjamini_hochberg(p: Floats, made: NDArray[np.bool_]) -> Floats:
     return adjusted
 
 
-def final_interval(function: Callable[..., Any]) -> Verdict:
+def final_interval(function: Callable[..., Any]) -> Judgement:
     """Student's 95 % interval of the mean final return, from curves `[S, E]`."""
 
     def case(seeds: int, epochs: int) -> Case:
@@ -101,6 +101,6 @@ def final_interval(function: Callable[..., Any]) -> Verdict:
         }
         return Case((curves,), expected, mistakes, hint="the interval is wrong")
 
-    return judge(
+    return judge_cases(
         function, [case(10, 500), case(5, 40)], "right: one number per seed, n − 1, and Student's quantile"
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 _EPOCHS = {
     "two epochs, one of many short episodes": ([20.0, 2.0], [100.0, 2000.0]),
@@ -14,7 +14,7 @@ _EPOCHS = {
 }
 
 
-def taken_apart(function: Callable[..., Any]) -> Verdict:
+def taken_apart(function: Callable[..., Any]) -> Judgement:
     """Steps per episode and reward per step of one seed, from what its epochs recorded."""
     cases = []
     for about, (ended, returns) in _EPOCHS.items():
@@ -43,10 +43,10 @@ def taken_apart(function: Callable[..., Any]) -> Verdict:
                 (episodes, means, steps), (everything / count, total / everything), mistakes, hint, rtol=1e-9
             )
         )
-    return judge(function, cases, "sums first, then one division")
+    return judge_cases(function, cases, "sums first, then one division")
 
 
-def ratio_of_lengths(function: Callable[..., Any]) -> Verdict:
+def ratio_of_lengths(function: Callable[..., Any]) -> Judgement:
     """Ratio of the geometric means of two groups of lengths."""
     rng = np.random.default_rng(0)
 
@@ -71,4 +71,4 @@ def ratio_of_lengths(function: Callable[..., Any]) -> Verdict:
         ),
         case(10 ** rng.normal(-2, 0.5, 10), 10 ** rng.normal(-1, 0.2, 10), "ten lengths each, far apart"),
     ]
-    return judge(function, cases, "geometric means, and one base of logarithms")
+    return judge_cases(function, cases, "geometric means, and one base of logarithms")

@@ -1,6 +1,6 @@
 """How an exercise is judged: a grader runs the reader's function and says what is wrong, in words.
 
-Each grader is named after the exercise's function, and returns a :class:`Verdict` that a notebook shows. An exercise
+Each grader is named after the exercise's function, and returns a :class:`Judgement` that a notebook shows. An exercise
 that has not been answered (its function still returns ``...``) is not a failure: *Run All* goes on.
 
 The references here are written differently from the chapters' solutions, so that a slip in one is not a slip in both.
@@ -16,10 +16,10 @@ import torch
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """What a grader found.
 
-    Made by `judge`, which has an example.
+    Made by `judge_cases`, which has an example.
     """
 
     exercise: str
@@ -46,7 +46,7 @@ class Verdict:
 class Case:
     """One call of the reader's function, what it should return, and what known mistakes would return.
 
-    Judged by `judge`, which has an example.
+    Judged by `judge_cases`, which has an example.
     """
 
     arguments: tuple[Any, ...]
@@ -58,7 +58,7 @@ class Case:
     rtol: float = 1e-6
 
 
-def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verdict:
+def judge_cases(function: Callable[..., Any], cases: list[Case], success: str) -> Judgement:
     """Run every case; stop at the first wrong value and name the mistake behind it, if it is a known one.
 
     Args:
@@ -68,7 +68,7 @@ def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verd
 
     Example:
         >>> square = Case((3.0,), 9.0, {"that is the double, not the square": 6.0})
-        >>> judge(lambda x: 2 * x, [square], "squares are right")
+        >>> judge_cases(lambda x: 2 * x, [square], "squares are right")
         ✗ not yet: <lambda>: that is the double, not the square
     """
     name = getattr(function, "__name__", "your function")
@@ -76,16 +76,16 @@ def judge(function: Callable[..., Any], cases: list[Case], success: str) -> Verd
         try:
             answer = detached(function(*case.arguments))
         except Exception as error:
-            return Verdict(name, False, f"it raised {type(error).__name__}: {error}")
+            return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
         if answer is ... or answer is None or answer is NotImplemented:
-            return Verdict(name, None, "write it, and run this cell again")
+            return Judgement(name, None, "write it, and run this cell again")
         if agrees(answer, case.expected, case.rtol):
             continue
         for diagnosis, wrong in case.mistakes.items():
             if agrees(answer, wrong, case.rtol):
-                return Verdict(name, False, diagnosis)
-        return Verdict(name, False, f"{case.hint}: expected {brief(case.expected)}, got {brief(answer)}")
-    return Verdict(name, True, success)
+                return Judgement(name, False, diagnosis)
+        return Judgement(name, False, f"{case.hint}: expected {brief(case.expected)}, got {brief(answer)}")
+    return Judgement(name, True, success)
 
 
 def judge_by_checks(
@@ -93,7 +93,7 @@ def judge_by_checks(
     checks: Mapping[str, Callable[[Any], str | None]],
     answered: Callable[[], bool],
     fallback: str = "your function",
-) -> Verdict:
+) -> Judgement:
     """Run named checks in their order; the first that finds something wrong gives the verdict.
 
     Args:
@@ -111,13 +111,13 @@ def judge_by_checks(
     for check, wrong in checks.items():
         try:
             if not answered():
-                return Verdict(name, None, "write it, and run this cell again")
+                return Judgement(name, None, "write it, and run this cell again")
             complaint = wrong(function)
         except Exception as error:
-            return Verdict(name, False, f'check "{check}": it raised {type(error).__name__}: {error}')
+            return Judgement(name, False, f'check "{check}": it raised {type(error).__name__}: {error}')
         if complaint:
-            return Verdict(name, False, f'check "{check}": {complaint}')
-    return Verdict(name, True, f"all {len(checks)} checks pass")
+            return Judgement(name, False, f'check "{check}": {complaint}')
+    return Judgement(name, True, f"all {len(checks)} checks pass")
 
 
 def judge_diagnosis(
@@ -127,7 +127,7 @@ def judge_diagnosis(
     noun: str,
     stopped_before: str,
     lets_pass: str,
-) -> Verdict:
+) -> Judgement:
     """Judge the reader's prediction of which check stops which broken function.
 
     Args:
@@ -144,9 +144,9 @@ def judge_diagnosis(
         ✓ passed: diagnosis: every bug is stopped by the check that you named
     """
     if any(answers.get(name, ...) is ... for name in broken):
-        return Verdict("diagnosis", None, f"name a check for every {noun}, and run this cell again")
+        return Judgement("diagnosis", None, f"name a check for every {noun}, and run this cell again")
     if unknown := [answer for answer in answers.values() if answer not in checks]:
-        return Verdict(
+        return Judgement(
             "diagnosis", False, f"no check is called {unknown[0]!r}; there are {', '.join(checks)}"
         )
     order = list(checks)
@@ -157,8 +157,8 @@ def judge_diagnosis(
             continue
         stopped = first is not None and order.index(first) < order.index(answer)
         hint = (stopped_before if stopped else lets_pass).format(answer=answer)
-        return Verdict("diagnosis", False, f"{noun} {name}: {hint}")
-    return Verdict("diagnosis", True, "every bug is stopped by the check that you named")
+        return Judgement("diagnosis", False, f"{noun} {name}: {hint}")
+    return Judgement("diagnosis", True, "every bug is stopped by the check that you named")
 
 
 def detached(answer: Any) -> Any:

@@ -9,12 +9,12 @@ import numpy as np
 from scipy import stats
 from scipy.special import logit
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["mean_kl", "squashed_score"]
 
 
-def squashed_score(function: Callable[..., Any]) -> Verdict:
+def squashed_score(function: Callable[..., Any]) -> Judgement:
     """The gradient of the action's log-density with respect to (μ, log σ), from the action."""
 
     def case(fraction: float, loc: float, log_scale: float, low: float, high: float) -> Case:
@@ -48,10 +48,10 @@ def squashed_score(function: Callable[..., Any]) -> Verdict:
         case(0.35, -1.0, 0.6, 0.0, 1.0),
         case(0.05, 0.5, 0.0, -0.4, 2.0),
     ]
-    return judge(function, cases, "right: the squash has no say in the score")
+    return judge_cases(function, cases, "right: the squash has no say in the score")
 
 
-def mean_kl(function: Callable[..., Any]) -> Verdict:
+def mean_kl(function: Callable[..., Any]) -> Judgement:
     """The mean over states of KL(old‖new) of policies with several action dimensions."""
     rng = np.random.default_rng(0)
 
@@ -70,7 +70,9 @@ def mean_kl(function: Callable[..., Any]) -> Verdict:
         }
         return Case((loc_old, scale_old, loc_new, scale_new), forward.sum(1).mean(), mistakes)
 
-    return judge(function, [case(5, 3), case(1, 17)], "right: summed over dimensions, averaged over states")
+    return judge_cases(
+        function, [case(5, 3), case(1, 17)], "right: summed over dimensions, averaged over states"
+    )
 
 
 def _kl(loc: Any, scale: Any, loc_new: Any, scale_new: Any) -> np.ndarray:

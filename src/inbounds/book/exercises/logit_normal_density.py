@@ -8,13 +8,13 @@ import numpy as np
 import torch
 from scipy import integrate, stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 from inbounds.distributions import LogitNormal
 
 __all__ = ["entropy_by_quadrature", "log_prob_from_latent"]
 
 
-def log_prob_from_latent(function: Callable[..., Any]) -> Verdict:
+def log_prob_from_latent(function: Callable[..., Any]) -> Judgement:
     """Judge the log-density of the action at ``g(latent)``, stable for large latents."""
 
     def case(latent: float, loc: float, scale: float, low: float, high: float, **known: Any) -> Case:
@@ -39,10 +39,10 @@ def log_prob_from_latent(function: Callable[..., Any]) -> Verdict:
         case(40.0, 38.0, 2.0, -1.0, 1.0, hint=saturated),
         case(-800.0, -790.0, 5.0, 0.0, 2.0, hint=overflow),
     ]
-    return judge(function, cases, "right, at the centre and far out")
+    return judge_cases(function, cases, "right, at the centre and far out")
 
 
-def entropy_by_quadrature(function: Callable[..., Any]) -> Verdict:
+def entropy_by_quadrature(function: Callable[..., Any]) -> Judgement:
     """Judge the differential entropy on (low, high)."""
 
     def case(loc: float, scale: float, low: float, high: float) -> Case:
@@ -68,6 +68,6 @@ def entropy_by_quadrature(function: Callable[..., Any]) -> Verdict:
 
     cases = [case(0.0, 1.0, 0.0, 3.0), case(1.5, 0.4, -1.0, 1.0), case(-0.5, 2.7, -1.0, 1.0)]
     reference = LogitNormal(torch.tensor(0.0), torch.tensor(1.0), 0.0, 3.0).entropy().item()
-    return judge(
+    return judge_cases(
         function, cases, f"right (LogitNormal.entropy() agrees: {reference:.4f} nats in the first case)"
     )

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy import integrate, optimize, stats
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 
 def _clipped_std(scale: float) -> float:
@@ -23,7 +23,7 @@ def _scale_for(std_of: Callable[[float], float], std: float) -> float:
     return float(optimize.brentq(lambda s: std_of(s) - std, 1e-3, 200, xtol=1e-12))
 
 
-def matched_scale(function: Callable[..., Any]) -> Verdict:
+def matched_scale(function: Callable[..., Any]) -> Judgement:
     """σ of the centred Gaussian whose action, clipped to [−1, 1], has a given standard deviation."""
 
     def case(std: float, hint: str) -> Case:
@@ -40,10 +40,10 @@ def matched_scale(function: Callable[..., Any]) -> Verdict:
         case(0.7184, "σ = 1 gives 0.7184: the default of a Gaussian policy"),
         case(0.9, "wide noise needs a wide bracket for the root"),
     ]
-    return judge(function, cases, "right, from hardly clipped to nearly all of it")
+    return judge_cases(function, cases, "right, from hardly clipped to nearly all of it")
 
 
-def share_seen(function: Callable[..., Any]) -> Verdict:
+def share_seen(function: Callable[..., Any]) -> Judgement:
     """Discounted sum of T equal rewards, as a share of their plain sum."""
 
     def case(gamma: float, horizon: int, hint: str) -> Case:
@@ -64,4 +64,4 @@ def share_seen(function: Callable[..., Any]) -> Verdict:
         case(0.99, 1000, "add γ⁰ to γ^(T−1), divide by T"),
         case(0.9999, 1000, "add γ⁰ to γ^(T−1), divide by T"),
     ]
-    return judge(function, cases, "right: the right number of terms, and a share")
+    return judge_cases(function, cases, "right: the right number of terms, and a share")

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["lambda_returns", "leave_one_out_gradient"]
 
 
-def leave_one_out_gradient(function: Callable[..., Any]) -> Verdict:
+def leave_one_out_gradient(function: Callable[..., Any]) -> Judgement:
     """The REINFORCE gradient in one state, with respect to (μ, log σ), each draw against the mean of the others."""
     rng = np.random.default_rng(0)
 
@@ -39,10 +39,10 @@ def leave_one_out_gradient(function: Callable[..., Any]) -> Verdict:
         return Case((latent, returns, loc, log_scale), right, mistakes)
 
     cases = [case(4, 0.3, -0.5), case(2, -1.0, 0.4), case(64, 0.0, 0.2)]
-    return judge(function, cases, "right: no return is in its own baseline")
+    return judge_cases(function, cases, "right: no return is in its own baseline")
 
 
-def lambda_returns(function: Callable[..., Any]) -> Verdict:
+def lambda_returns(function: Callable[..., Any]) -> Judgement:
     """The λ-returns of a rollout in which episodes end, are cut off, and go on."""
     rng = np.random.default_rng(0)
 
@@ -78,7 +78,7 @@ def lambda_returns(function: Callable[..., Any]) -> Verdict:
         case({1: "truncated", 4: "terminated", 8: "truncated"}, 12, 0.97, 0.95),
         case({3: "truncated"}, 8, 0.9, 1.0),
     ]
-    return judge(function, cases, "right: ends end, cuts do not")
+    return judge_cases(function, cases, "right: ends end, cuts do not")
 
 
 def _forward(

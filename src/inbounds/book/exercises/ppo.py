@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from inbounds.book.exercises.judging import Case, Verdict, judge, judge_by_checks, judge_diagnosis
+from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
 from inbounds.book.ppo_checks import ACT, CHECKS, GAUSSIAN, OBS, STEPS, Loss, Scene, policy_loss
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig, Rollout, ppo
 from inbounds.learning.updates.minibatches import Minibatch
@@ -31,7 +31,7 @@ _COEFFICIENTS = (
 )
 
 
-def clipped_surrogate(function: Callable[..., Any]) -> Verdict:
+def clipped_surrogate(function: Callable[..., Any]) -> Judgement:
     """min(r Â, clip(r) Â), elementwise.
 
     Args:
@@ -63,10 +63,10 @@ def clipped_surrogate(function: Callable[..., Any]) -> Verdict:
         return Case((torch.tensor(r), torch.tensor(a), clip_range), expected, mistakes)
 
     six = [0.5, 1.05, 1.7, 0.5, 1.05, 1.7], [2.0, 2.0, 2.0, -1.0, -1.0, -1.0]
-    return judge(function, [case(*six, 0.2), case(*six, 0.02)], "right, in all six cases")
+    return judge_cases(function, [case(*six, 0.2), case(*six, 0.02)], "right, in all six cases")
 
 
-def ppo_loss(function: Loss) -> Verdict:
+def ppo_loss(function: Loss) -> Judgement:
     """PPO's loss of one minibatch, by the named checks.
 
     Args:
@@ -83,7 +83,7 @@ def ppo_loss(function: Loss) -> Verdict:
     return judge_by_checks(function, CHECKS, answered)
 
 
-def diagnosis(answers: Mapping[str, Any], losses: Mapping[str, Loss]) -> Verdict:
+def diagnosis(answers: Mapping[str, Any], losses: Mapping[str, Loss]) -> Judgement:
     """Which check stops which broken loss, as the reader predicts it.
 
     Args:
@@ -108,7 +108,7 @@ class _OneOrder:
         return np.random.default_rng(self.seed).permutation(length)
 
 
-def ppo_update(function: Callable[..., Any]) -> Verdict:
+def ppo_update(function: Callable[..., Any]) -> Judgement:
     """A whole update: where it takes the weights, beside the package.
 
     Args:
@@ -132,17 +132,17 @@ def ppo_update(function: Callable[..., Any]) -> Verdict:
     try:
         function(actor, critic, optimizer, _data(start), GAUSSIAN, rng, **options)
     except Exception as error:
-        return Verdict(name, False, f"it raised {type(error).__name__}: {error}")
+        return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
     after = _weights(actor, critic)
     if torch.equal(before, after):
-        return Verdict(name, None, "the weights have not moved: write it, and run this cell again")
+        return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
     if _same(after, _package(config)):
-        return Verdict(name, True, "its weights are the package's, after every minibatch of three passes")
+        return Judgement(name, True, "its weights are the package's, after every minibatch of three passes")
     for mistake, wrong in _mistakes(config).items():
         if _same(after, wrong):
-            return Verdict(name, False, mistake)
+            return Judgement(name, False, mistake)
     hints = "zero_grad before every backward? one norm over both networks? the stored log-probabilities left alone?"
-    return Verdict(
+    return Judgement(
         name, False, f"the weights end elsewhere than the package's, in no way that is known: {hints}"
     )
 

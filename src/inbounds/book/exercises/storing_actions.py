@@ -6,10 +6,10 @@ from typing import Any
 
 import torch
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 
-def log_slope(function: Callable[..., Any]) -> Verdict:
+def log_slope(function: Callable[..., Any]) -> Judgement:
     """The logarithm of 1 - tanh(x)², in single precision, with its gradient by autograd."""
 
     def value_and_gradient(x: float | list[float]) -> list[Any]:
@@ -54,6 +54,6 @@ def log_slope(function: Callable[..., Any]) -> Verdict:
             rtol=3e-5,
         ),
     ]
-    return judge(
+    return judge_cases(
         value_and_gradient, cases, "right, value and derivative, on both sides, as far as float32 goes"
     )

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["effective_sample_size", "surrogate_of"]
 
 
-def effective_sample_size(function: Callable[..., Any]) -> Verdict:
+def effective_sample_size(function: Callable[..., Any]) -> Judgement:
     """(Σ r)² / Σ r² from log-ratios, without overflow."""
 
     def case(log_ratio: np.ndarray, **known: Any) -> Case:
@@ -47,10 +47,10 @@ def effective_sample_size(function: Callable[..., Any]) -> Verdict:
         case(draws - 1000.0, hint=underflow),
         case(np.array([0.0, -3.0, 900.0]), hint=overflow),
     ]
-    return judge(function, cases, "right, for any size of the ratios")
+    return judge_cases(function, cases, "right, for any size of the ratios")
 
 
-def surrogate_of(function: Callable[..., Any]) -> Verdict:
+def surrogate_of(function: Callable[..., Any]) -> Judgement:
     """The surrogate of a Gaussian policy with several action dimensions."""
     rng = np.random.default_rng(0)
 
@@ -88,6 +88,6 @@ def surrogate_of(function: Callable[..., Any]) -> Verdict:
             (loc, scale, old_loc, old_scale, latent, advantage), weighted(np.exp(right.sum(1))), mistakes
         )
 
-    return judge(
+    return judge_cases(
         function, [case(5, 3), case(40, 6), case(3, 1)], "right: one ratio per step, of two whole laws"
     )

@@ -11,12 +11,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from inbounds.book.exercises.judging import Case, Verdict, judge
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
 __all__ = ["clip_per_seed", "lockstep_loss"]
 
 
-def clip_per_seed(function: Callable[..., Any]) -> Verdict:
+def clip_per_seed(function: Callable[..., Any]) -> Judgement:
     """Clipping of gradients by each seed's norm over all tensors, in place or into new ones."""
 
     @functools.wraps(function)
@@ -74,10 +74,10 @@ def clip_per_seed(function: Callable[..., Any]) -> Verdict:
         case(gradients((4, 3), (4, 1), (2, 4), (2, 1)), 1.0),
         replace(case(poisoned, 0.5), mistakes={}, hint=lost),
     ]
-    return judge(rows, cases, "right: each seed by its own norm, and a diverged one harms no other")
+    return judge_cases(rows, cases, "right: each seed by its own norm, and a diverged one harms no other")
 
 
-def lockstep_loss(function: Callable[..., Any]) -> Verdict:
+def lockstep_loss(function: Callable[..., Any]) -> Judgement:
     """The loss of one PPO minibatch of S seeds, judged by its gradients: those of each seed alone."""
 
     @functools.wraps(function)
@@ -127,7 +127,7 @@ def lockstep_loss(function: Callable[..., Any]) -> Verdict:
         return Case(arguments, expected(1, batch), mistakes, hint="some gradient is wrong")
 
     cases = [case(4, 8), case(2, 33)]
-    return judge(gradients, cases, "right: every seed's gradients are those of a run alone")
+    return judge_cases(gradients, cases, "right: every seed's gradients are those of a run alone")
 
 
 def _rows(tensor: Any) -> np.ndarray:

@@ -24,7 +24,14 @@ import torch
 from torch import Tensor
 from torch.distributions import Normal, kl_divergence
 
-from inbounds.book.exercises.judging import Case, Verdict, detached, judge, judge_by_checks, judge_diagnosis
+from inbounds.book.exercises.judging import (
+    Case,
+    Judgement,
+    detached,
+    judge_by_checks,
+    judge_cases,
+    judge_diagnosis,
+)
 
 __all__ = ["CHECKS", "diagnosis", "linear_fisher_product", "trpo_step"]
 
@@ -186,7 +193,7 @@ CHECKS: Mapping[str, Callable[[Step], str]] = {
 """By name, in the order in which they are run: what is wrong with a step, or nothing."""
 
 
-def trpo_step(function: Step) -> Verdict:
+def trpo_step(function: Step) -> Judgement:
     """A policy step of TRPO, by the named checks.
 
     Args:
@@ -207,7 +214,7 @@ def trpo_step(function: Step) -> Verdict:
     return judge_by_checks(function, CHECKS, answered, fallback="your step")
 
 
-def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Verdict:
+def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Judgement:
     """Which check stops which broken step, as the reader predicts it.
 
     Args:
@@ -228,7 +235,7 @@ def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Verdict:
     )
 
 
-def linear_fisher_product(function: Callable[..., Any]) -> Verdict:
+def linear_fisher_product(function: Callable[..., Any]) -> Judgement:
     """F v for a Gaussian policy with location W φ(s) and one free log σ per action dimension.
 
     Args:
@@ -250,7 +257,7 @@ def linear_fisher_product(function: Callable[..., Any]) -> Verdict:
     joined.__name__ = getattr(function, "__name__", "linear_fisher_product")
     rng = np.random.default_rng(0)
     cases = [_linear_case(rng, *sizes) for sizes in ((7, 3, 2), (4, 5, 1))]
-    return judge(joined, cases, "right: the Hessian of the mean KL divergence, without a Hessian")
+    return judge_cases(joined, cases, "right: the Hessian of the mean KL divergence, without a Hessian")
 
 
 def _linear_case(rng: np.random.Generator, states: int, features: int, act_dim: int) -> Case:

@@ -12,13 +12,13 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from inbounds.book.environment_checks import CHECKS, MakeEnvs
-from inbounds.book.exercises.judging import Case, Verdict, judge, judge_by_checks, judge_diagnosis
+from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
 from inbounds.learning.families.policy import SATURATION_MARGIN
 
 __all__ = ["at_bounds", "diagnosis", "own_environment", "value_under_a_clock"]
 
 
-def at_bounds(function: Callable[..., Any]) -> Verdict:
+def at_bounds(function: Callable[..., Any]) -> Judgement:
     """Shares of executed actions at the lower and at the upper bound, for each dimension: `[2, A]`.
 
     Args:
@@ -70,10 +70,10 @@ def at_bounds(function: Callable[..., Any]) -> Verdict:
         case(clipped, low, high),
         replace(case(wide, np.array([-500.0]), np.array([200.0])), mistakes={}),
     ]
-    return judge(of, cases, "right, in any units")
+    return judge_cases(of, cases, "right, in any units")
 
 
-def value_under_a_clock(function: Callable[..., Any]) -> Verdict:
+def value_under_a_clock(function: Callable[..., Any]) -> Judgement:
     """Mean value that a critic learns if a clock of N steps is called termination; the reward is 1 in each step.
 
     Args:
@@ -99,10 +99,10 @@ def value_under_a_clock(function: Callable[..., Any]) -> Verdict:
         }
         return Case((gamma, steps), left.mean(), mistakes)
 
-    return judge(function, [case(0.97, 96), case(0.5, 4), case(0.99, 1000)], "right")
+    return judge_cases(function, [case(0.97, 96), case(0.5, 4), case(0.99, 1000)], "right")
 
 
-def own_environment(make: MakeEnvs) -> Verdict:
+def own_environment(make: MakeEnvs) -> Judgement:
     """All checks of `inbounds.book.environment_checks`, on the reader's environment.
 
     Args:
@@ -119,7 +119,7 @@ def own_environment(make: MakeEnvs) -> Verdict:
     return judge_by_checks(make, CHECKS, answered, "your environment")
 
 
-def diagnosis(answers: Mapping[str, Any], broken: Mapping[str, MakeEnvs]) -> Verdict:
+def diagnosis(answers: Mapping[str, Any], broken: Mapping[str, MakeEnvs]) -> Judgement:
     """Which check stops which broken environment, as the reader predicts it.
 
     Args:

@@ -181,7 +181,7 @@ def _bounded_densities_figure(laws: MatchedLaws) -> Figure:
         atoms = ax.twinx()
         atoms.set(ylim=(0.0, 1.0), ylabel="probability at a bound")
         atoms.grid(False)
-        color = figures.FAMILIES["gaussian"].color
+        color = figures.LOOKS["gaussian"].color
         for x, mass in zip((-1.14, 1.14), laws.atoms, strict=True):
             atoms.bar(x, mass, width=0.14, facecolor="none", edgecolor=color, hatch="////", linewidth=1.6)
             atoms.annotate(

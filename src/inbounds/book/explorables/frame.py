@@ -99,7 +99,7 @@ class Explorable:
     """Rows of the table: key in the model's ``table``, and heading."""
     fallback: Callable[[], Figure]
     """Draws the static figure at the initial values."""
-    looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.FAMILIES)
+    looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.LOOKS)
     """The look of every curve: the policy families', where the curves are families."""
 
     def __post_init__(self) -> None:
@@ -278,7 +278,7 @@ def plot(
 
 def family_curve(fig: figure, family: str) -> None:
     """Add a policy family's curve, empty; the model fills the source of the same name with ``x`` and ``y``."""
-    curve(fig, family, figures.FAMILIES[family], source=family)
+    curve(fig, family, figures.LOOKS[family], source=family)
 
 
 def curve(fig: figure, name: str, look: figures.FamilyStyle, *, source: str) -> None:

@@ -142,7 +142,7 @@ def greedy_actions(mu: float = 0.3, sigma: float = 1.6) -> Explorable:
             "slope": "change of c per unit of μ",
         },
         fallback=lambda: _static_figure(policy),
-        looks={**CENTRES, "logit-normal": figures.FAMILIES["logit-normal"]},
+        looks={**CENTRES, "logit-normal": figures.LOOKS["logit-normal"]},
     )
 
 

@@ -150,7 +150,7 @@ def _picture(family: str) -> Any:
         height=210,
     )
     for role, width, alpha in (("old", 6, 0.4), ("new", 2.5, 1.0)):
-        curve(fig, family, figures.FAMILIES[family], source=f"{family}-{role}")
+        curve(fig, family, figures.LOOKS[family], source=f"{family}-{role}")
         fig.renderers[-1].glyph.update(line_width=width, line_alpha=alpha)
         if family == "clipped-gaussian":
             atoms = ColumnDataSource({"x": [], "mass": []}, name=f"atoms-{role}")

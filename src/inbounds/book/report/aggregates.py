@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.study_figures import interval_panels, performance_profiles
 from inbounds.book.report.words import in_words, pair_name, spoken
@@ -26,7 +26,7 @@ def columns_of(arm: str, algorithm: str) -> dict[str, Column]:
     """Return by family, in the book's order, the columns that an arm compares; arm 3's stand beside arm 1's."""
     arms = ("standard", "beyond") if arm == "beyond" else (arm,)
     planned = {cell.family for a in arms for cell in ARMS[a] if cell.algorithm == algorithm}
-    return {family: Column.within(arm, algorithm, family) for family in FAMILIES if family in planned}
+    return {family: Column.within(arm, algorithm, family) for family in LOOKS if family in planned}
 
 
 def aggregates(outcomes: Outcomes, arm: str, title: str) -> list[str]:
@@ -75,7 +75,7 @@ def _without_diverged(
     if not any(cell.diverged.any() for cell in cells if cell):
         return []
     rows = [
-        [algorithm.upper(), FAMILIES[family].label]
+        [algorithm.upper(), LOOKS[family].label]
         + [spoken(analysis.aggregate(outcomes, column, e, without_diverged=True), 2) for e in ENDPOINTS]
         for algorithm, row in columns.items()
         for family, column in row.items()
@@ -92,7 +92,7 @@ def _profiles(outcomes: Outcomes, title: str, columns: Mapping[str, Column]) -> 
     taus = np.linspace(low, high, 151)
     profiles = {f: analysis.profile(outcomes, c, "final", taus) for f, c in columns.items()}
     above = ", ".join(
-        f"{FAMILIES[f].label} {percent(np.mean([np.mean(each > 1) for each in found.values()]))}"
+        f"{LOOKS[f].label} {percent(np.mean([np.mean(each > 1) for each in found.values()]))}"
         for f, found in scores.items()
         if found
     )

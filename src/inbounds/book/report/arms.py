@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.aggregates import ALGORITHMS, HEADS, aggregates, columns_of
 from inbounds.book.report.study_figures import (
@@ -56,7 +56,7 @@ def arm_section(outcomes: Outcomes, arm: str) -> list[str]:
             continue
         parts += curves(title, cells)
         parts += endpoints(title, cells)
-        parts += differences(outcomes, arm, algorithm)
+        parts += difference_table(outcomes, arm, algorithm)
         parts += without_diverged(outcomes, arm, algorithm, cells)
         parts.append(diagnostics(title, cells))
     parts += aggregates(outcomes, arm, TITLES[arm].partition(": ")[2])
@@ -133,17 +133,19 @@ def endpoints(title: str, cells: Cells) -> list[str]:
     for robot, row in cells.items():
         for family, outcome in row.items():
             if outcome is None:
-                rows.append([robot, FAMILIES[family].label, "missing", *[""] * 7])
+                rows.append([robot, LOOKS[family].label, "missing", *[""] * 7])
                 continue
             numbers = [spoken(analysis.estimate(outcome, e, s)) for e in ENDPOINTS for s in ("mean", "iqm")]
             counts = [str(len(outcome.diverged)), str(int(outcome.diverged.sum()))]
-            rows.append([robot, FAMILIES[family].label, *counts, *numbers])
+            rows.append([robot, LOOKS[family].label, *counts, *numbers])
     caption = f"Endpoints ({title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval.{lacking(cells)}"
     alt = f"Final returns ({title}) with intervals, a panel per robot: {in_words(finals)}"
     return [html.figure(fig, alt, ""), html.table(caption, head, rows, words=(0, 1))]
 
 
-def differences(outcomes: Outcomes, arm: str, algorithm: str, *, without_diverged: bool = False) -> list[str]:
+def difference_table(
+    outcomes: Outcomes, arm: str, algorithm: str, *, without_diverged: bool = False
+) -> list[str]:
     """Return the differences between families: final returns as a figure, all endpoints as a table with tests."""
     contrasts = [c for c in CONTRASTS if (c.arm, c.algorithm) == (arm, algorithm)]
     found = {
@@ -202,7 +204,7 @@ def without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells)
             if outcome is not None and outcome.diverged.any():
                 found = [analysis.estimate(outcome, e, without_diverged=True) for e in ENDPOINTS]
                 count = str(int((~outcome.diverged).sum()))
-                rows.append([robot, FAMILIES[family].label, count, *map(spoken, found)])
+                rows.append([robot, LOOKS[family].label, count, *map(spoken, found)])
     means = html.table(
         f"Means of the cells concerned ({title_of(arm, algorithm)}), without seeds that diverged.",
         head,
@@ -212,7 +214,7 @@ def without_diverged(outcomes: Outcomes, arm: str, algorithm: str, cells: Cells)
     return [
         html.paragraph(said),
         means,
-        *differences(outcomes, arm, algorithm, without_diverged=True),
+        *difference_table(outcomes, arm, algorithm, without_diverged=True),
     ]
 
 
@@ -234,7 +236,7 @@ def diagnostics(title: str, cells: Cells) -> str:
             if outcome is not None:
                 numbers = [_first_and_last(outcome.measured[name]) for name in _DIAGNOSTICS]
                 clamps = np.sum([v for name, v in outcome.measured.items() if name.startswith("at_")], 0)
-                rows.append([robot, FAMILIES[family].label, *numbers, _first_and_last(clamps)])
+                rows.append([robot, LOOKS[family].label, *numbers, _first_and_last(clamps)])
     caption = (
         f"What happened inside ({title}): medians over seeds, of the first epoch → of the last five "
         "measurements. Spread, saturation and clamps of the first epoch are the untrained policy's: its noise. Later "
@@ -256,7 +258,7 @@ def ways(outcomes: Outcomes, arm: str) -> list[str]:
         return []
     names = list(dict.fromkeys(way for outcome in kept for way in outcome.ways))
     rows = [
-        [o.cell.robot, o.cell.algorithm.upper(), FAMILIES[o.cell.family].label]
+        [o.cell.robot, o.cell.algorithm.upper(), LOOKS[o.cell.family].label]
         + [spoken(analysis.by_way(o).get(way)) for way in names]
         for o in kept
     ]

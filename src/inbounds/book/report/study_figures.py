@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
-from inbounds.book.drawing.figures import FAMILIES, WIDTH, family_style, use_style
+from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style, use_style
 from inbounds.book.report.study_panels import (
     SMALL,
     families_in,
@@ -60,7 +60,7 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
     """Learning curves with bands: a panel per environment, a line per policy family.
 
     Args:
-        curves: per environment and family (a key of `FAMILIES`) its curve, or None where the cell is missing.
+        curves: per environment and family (a key of `LOOKS`) its curve, or None where the cell is missing.
         ylabel: what the curves show.
 
     Returns:
@@ -111,8 +111,8 @@ def _curve(ax: Any, family: str, curve: Curve) -> None:
     ax.fill_between(
         millions, curve.estimate.low, curve.estimate.high, color=style["color"], alpha=0.18, linewidth=0
     )
-    first = list(FAMILIES).index(family) * every // len(FAMILIES)
-    ax.plot(millions, value, marker=FAMILIES[family].marker, markevery=(first, every), linewidth=1.8, **style)
+    first = list(LOOKS).index(family) * every // len(LOOKS)
+    ax.plot(millions, value, marker=LOOKS[family].marker, markevery=(first, every), linewidth=1.8, **style)
 
 
 def interval_panels(
@@ -143,7 +143,7 @@ def interval_panels(
         ['Gaussian, clipped', 'Beta']
     """
     families = families_in(panels.values())
-    rows = {family: (FAMILIES[family].label, family) for family in families}
+    rows = {family: (LOOKS[family].label, family) for family in families}
     cells = {
         title: {f: (given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
         for title, given in panels.items()
@@ -239,7 +239,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     value, low, high = (np.asarray(x) for x in (estimate.value, estimate.low, estimate.high))
     if value.ndim:
         raise ValueError(f"expected one number a row, got an estimate of shape {value.shape}")
-    look = FAMILIES[family]
+    look = LOOKS[family]
     ax.plot([low, high], [place, place], color=look.color, linewidth=2.2, linestyle="-")
     ax.plot(
         value, place, look.marker, color=look.color, markersize=8, markeredgewidth=1.8,
@@ -284,11 +284,11 @@ def performance_profiles(
                 tau, share = profile.thresholds, profile.share
                 ax.fill_between(tau, share.low, share.high, color=style["color"], alpha=0.18, linewidth=0)
                 every = max(1, len(tau) // 5)
-                first = list(FAMILIES).index(family) * every // len(FAMILIES)
+                first = list(LOOKS).index(family) * every // len(LOOKS)
                 ax.plot(
                     tau,
                     share.value,
-                    marker=FAMILIES[family].marker,
+                    marker=LOOKS[family].marker,
                     markevery=(first, every),
                     linewidth=1.8,
                     **style,

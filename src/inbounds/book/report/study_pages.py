@@ -15,7 +15,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.drawing.videos import show_films
 from inbounds.book.report import arms as report_arms
 from inbounds.book.report import html, study_report
@@ -23,7 +23,7 @@ from inbounds.book.report import ledger as report_ledger
 from inbounds.book.report import results as report_results
 from inbounds.book.report.aggregates import aggregates, columns_of
 from inbounds.book.report.arms import Cells
-from inbounds.book.report.shown import Shown
+from inbounds.book.report.html_output import Shown
 from inbounds.learning import load_policy
 from inbounds.robots import Film, record
 from inbounds.study.ledger import CLAIMS, Finding, judge
@@ -65,11 +65,11 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     return _of_arm("endpoints", outcomes, arm, algorithm, report_arms.endpoints)
 
 
-def differences(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
+def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     """Return the differences between families: final returns as a figure, all endpoints as a table with tests."""
 
     def parts(_: str, cells: Cells) -> list[str]:
-        found = report_arms.differences(outcomes, arm, algorithm)
+        found = report_arms.difference_table(outcomes, arm, algorithm)
         return found + report_arms.without_diverged(outcomes, arm, algorithm, cells)
 
     return _of_arm("differences", outcomes, arm, algorithm, parts)
@@ -135,8 +135,8 @@ def films(outcomes: Outcomes, robot: str, algorithm: str = "ppo", seconds: float
     """
     columns = columns_of("standard", algorithm)
     found = {f: outcome for f, c in columns.items() if (outcome := outcomes.find(c, robot)) is not None}
-    parts = _side_by_side(outcomes, {FAMILIES[f].label: o for f, o in found.items()}, seconds)
-    lacking = [FAMILIES[family].label for family in columns if family not in found]
+    parts = _side_by_side(outcomes, {LOOKS[f].label: o for f, o in found.items()}, seconds)
+    lacking = [LOOKS[family].label for family in columns if family not in found]
     if lacking:
         parts.append(html.paragraph(f"missing, not finished: {', '.join(lacking)}.", "missing"))
     return _shown(f"films: {robot}, {algorithm.upper()}, one per family", parts)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import FAMILIES, WIDTH, family_style
+from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import percent
 
@@ -24,7 +24,7 @@ def families_in(panels: Iterable[Mapping[str, Any]]) -> list[str]:
         family_style(family)
     if not named:
         raise ValueError("nothing to draw: pass at least one policy family, None where it is missing")
-    return [family for family in FAMILIES if family in named]
+    return [family for family in LOOKS if family in named]
 
 
 def panel_grid(titles: list[str], row_height: float, *, sharey: bool = False) -> tuple[Figure, list[Any]]:
@@ -61,7 +61,7 @@ def left_out(estimate: Estimate) -> str:
 def list_gaps(ax: Any, cells: Mapping[str, Estimate | None], *, at_left: bool = True) -> None:
     """Write into a panel which families are missing, and which lost seeds: at the left on room made for it."""
     lines = [
-        f"{FAMILIES[family].label}: {left_out(estimate) if estimate else 'missing'}"
+        f"{LOOKS[family].label}: {left_out(estimate) if estimate else 'missing'}"
         for family, estimate in cells.items()
         if estimate is None or left_out(estimate)
     ]
@@ -83,9 +83,7 @@ def without_scale(ax: Any, axis: Literal["x", "both"]) -> None:
 
 def family_legend(fig: Figure, families: list[str]) -> None:
     """One legend above all panels, of every family that has a place in the figure."""
-    handles = [
-        plt.Line2D([], [], marker=FAMILIES[family].marker, **family_style(family)) for family in families
-    ]
+    handles = [plt.Line2D([], [], marker=LOOKS[family].marker, **family_style(family)) for family in families]
     fig.legend(handles=handles, loc="outside upper center", ncols=2 if len(families) in (2, 4) else 3)
 
 

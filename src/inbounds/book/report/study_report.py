@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.arms import HEADS, NONE_FINISHED, TITLES, arm_section
 from inbounds.book.report.ledger import ledger_section
@@ -164,7 +164,7 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
         found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
         panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
         if found["final"] is not None:
-            names.append((cell.robot, cell.algorithm.upper(), FAMILIES[cell.family].label, cell.variant))
+            names.append((cell.robot, cell.algorithm.upper(), LOOKS[cell.family].label, cell.variant))
             rows.append([spoken(estimate) for estimate in found.values()])
     if not rows:
         return [NONE_FINISHED]
@@ -177,7 +177,7 @@ def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]
     }
     fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
-        f"{panel}: " + ", ".join(f"{FAMILIES[f].label} {spoken(e)}" for f, e in row.items())
+        f"{panel}: " + ", ".join(f"{LOOKS[f].label} {spoken(e)}" for f, e in row.items())
         for panel, row in panels.items()
     )
     # What all rows share is said once, in the caption: the table is wide enough.

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import FAMILIES, WIDTH
+from inbounds.book.drawing.figures import LOOKS, WIDTH
 from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate, difference
@@ -123,7 +123,7 @@ def draw(rows: Sequence[Row]) -> Figure:
     for ax, (way, title) in zip(axes.flat, WAYS.items(), strict=True):
         for place, row in enumerate(lines):
             if isinstance(row, Row):
-                gain, look = row.gains[way], FAMILIES[row.family]
+                gain, look = row.gains[way], LOOKS[row.family]
                 reach = [[gain.value - gain.low], [gain.high - gain.value]]
                 ax.errorbar(gain.value, place, xerr=reach, fmt=look.marker, color=look.color, markersize=5)
         ax.axvline(0, color="#8a8f98", linewidth=1, linestyle=":")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from inbounds.book.drawing.figures import FAMILIES
+from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report.study_figures import SHORT
 from inbounds.study.analysis import Contrast
 from inbounds.study.statistics import Estimate
@@ -22,6 +22,6 @@ def in_words(panels: Mapping[str, Mapping[str, Estimate | None]]) -> str:
     """Say the values of estimates by panel and family, for those who cannot see the figure."""
     return ". ".join(
         f"{panel}: "
-        + ", ".join(f"{FAMILIES[f].label} {number(e.value) if e else 'missing'}" for f, e in row.items())
+        + ", ".join(f"{LOOKS[f].label} {number(e.value) if e else 'missing'}" for f, e in row.items())
         for panel, row in panels.items()
     )

@@ -23,7 +23,7 @@ def describe(config: TrainConfig) -> dict[str, Any]:
     return {**dataclasses.asdict(config), "algorithm_name": config.algorithm_name}
 
 
-def differences(
+def changed_fields(
     config: TrainConfig, stored: Mapping[str, Any], free: Collection[str] = ("checkpoint_every",)
 ) -> dict[str, tuple[Any, Any]]:
     """Return the options in which a stored configuration differs from one of today.
@@ -41,7 +41,7 @@ def differences(
         >>> from inbounds.learning import preset
         >>> config = preset("common", "Hopper-v5")
         >>> stored = describe(config) | {"normalize_obs": False}
-        >>> differences(config, stored)
+        >>> changed_fields(config, stored)
         {'normalize_obs': (False, True)}
     """
     ours = {name: value for name, (value, _) in _options(config).items()}

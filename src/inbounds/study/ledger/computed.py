@@ -21,7 +21,7 @@ from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, 
 from inbounds.learning.training import one_thread
 from inbounds.study.analysis import generator_for
 from inbounds.study.ledger.evidence import combination, side
-from inbounds.study.ledger.halves import half_left
+from inbounds.study.ledger.half_of_a_gap import half_left
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Floats, Outcomes
 from inbounds.study.statistics import Estimate

@@ -7,8 +7,8 @@ from scipy.special import logit
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import computed
 from inbounds.study.ledger.evidence import costs, exceeds, learns
-from inbounds.study.ledger.halves import half_remains
-from inbounds.study.ledger.naming import AS_THEY_START, EQUALLY_LOUD, LOUDNESS_CELLS, NOISY, cells
+from inbounds.study.ledger.half_of_a_gap import half_remains
+from inbounds.study.ledger.shared_names import AS_THEY_START, EQUALLY_LOUD, LOUDNESS_CELLS, NOISY, cells
 from inbounds.study.ledger.verdicts import Claim
 from inbounds.study.outcomes import Column
 

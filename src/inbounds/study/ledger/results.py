@@ -17,8 +17,8 @@ from inbounds.study.ledger.evidence import (
     improves,
     together,
 )
-from inbounds.study.ledger.halves import half_remains
-from inbounds.study.ledger.naming import (
+from inbounds.study.ledger.half_of_a_gap import half_remains
+from inbounds.study.ledger.shared_names import (
     AS_THEY_START,
     EQUALLY_LOUD,
     LOUDNESS_CELLS,

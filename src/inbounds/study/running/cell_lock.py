@@ -25,8 +25,8 @@ class ClaimedError(RuntimeError):
     """Somebody else runs the cell, or has taken it over."""
 
 
-class Claim:
-    """The right to run a cell, from `Claim.take` until `release`.
+class CellLock:
+    """The right to run a cell, from `CellLock.take` until `release`.
 
     Args:
         folder: the cell's work folder.
@@ -37,8 +37,8 @@ class Claim:
         self.folder, self.owner = folder, dict(owner)
 
     @classmethod
-    def take(cls, folder: Path) -> Claim:
-        """Claim a cell.
+    def take(cls, folder: Path) -> CellLock:
+        """CellLock a cell.
 
         Args:
             folder: the cell's work folder; made if missing.
@@ -48,7 +48,7 @@ class Claim:
 
         Example:
             >>> import tempfile
-            >>> with tempfile.TemporaryDirectory() as name, Claim.take(Path(name)) as claim:
+            >>> with tempfile.TemporaryDirectory() as name, CellLock.take(Path(name)) as claim:
             ...     claim.renew(epoch=3)
             ...     read_claim(Path(name))["epoch"]
             3

@@ -27,7 +27,7 @@ from inbounds.study.grid import Cell
 from inbounds.study.store import StudyFolder
 
 if TYPE_CHECKING:
-    from inbounds.study.running.many_cells import Report, Settings, Summary
+    from inbounds.study.running.many_cells import CellReport, Settings, Summary
     from inbounds.study.running.progress import StudyProgress
 
 PAUSE = 5.0  # seconds until a cell is tried again that is still claimed, perhaps by a worker that is dead
@@ -77,12 +77,12 @@ def _run(
     how: tuple[Any, ...],
     progress: StudyProgress,
     signals: list[int],
-) -> dict[str, Report]:
+) -> dict[str, CellReport]:
     """Submit every cell, and again while somebody who may be dead claims it."""
     from distributed import TimeoutError as NothingYet
     from distributed import wait
 
-    from inbounds.study.running.many_cells import RETRIES, Report
+    from inbounds.study.running.many_cells import RETRIES, CellReport
 
     def submit(cell: Cell, number: int) -> Any:
         # Names make tasks unique: a cell that was claimed a moment ago is another task now.
@@ -92,7 +92,7 @@ def _run(
 
     numbers = {cell.id: number for number, cell in enumerate(cells)}
     pending = {submit(cell, numbers[cell.id]): cell for cell in cells}
-    reports: dict[str, Report] = {}
+    reports: dict[str, CellReport] = {}
     again: list[tuple[float, Cell]] = []
     failures: dict[str, int] = {}
     while pending or again:
@@ -108,7 +108,7 @@ def _run(
             except Exception as error:  # the worker died too often for Dask, or was taken away
                 failures[cell.id] = failures.get(cell.id, 0) + 1
                 outcome = "claimed" if failures[cell.id] <= RETRIES else "died"
-                report = Report(outcome, f"{type(error).__name__}: {error}")
+                report = CellReport(outcome, f"{type(error).__name__}: {error}")
             if report.outcome == "claimed" and not signals:
                 again.append((time.monotonic() + PAUSE, cell))
                 continue
@@ -122,12 +122,12 @@ def _run(
     return reports
 
 
-def run_on_worker(cell: Cell, folder: StudyFolder, nice: int, deadline: float, stop_file: str) -> Report:
+def run_on_worker(cell: Cell, folder: StudyFolder, nice: int, deadline: float, stop_file: str) -> CellReport:
     """Run a cell in a worker; the wish to stop is a file."""
-    from inbounds.study.running.many_cells import Report, attempt
+    from inbounds.study.running.many_cells import CellReport, attempt
 
     if os.path.exists(stop_file) or time.time() > deadline:
-        return Report("stopped")
+        return CellReport("stopped")
     with contextlib.suppress(OSError):
         os.nice(max(0, nice - os.nice(0)))
     return attempt(cell, folder, lambda: os.path.exists(stop_file), deadline)

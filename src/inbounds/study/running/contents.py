@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from inbounds.learning import FAMILIES, Limits, load_policies
-from inbounds.learning.storage.stored_config import describe, differences
+from inbounds.learning.storage.stored_config import changed_fields, describe
 from inbounds.study import store
 from inbounds.study.grid import Cell
 from inbounds.study.running.evaluate import FINAL_EPISODES
@@ -88,7 +88,7 @@ def wrong_policies(cell: Cell, path: Path) -> str:
         policies = load_policies(path)
     except (ValueError, KeyError, IndexError, RuntimeError) as error:
         return str(error).partition(": ")[0]
-    if different := differences(cell.config, describe(policies[0].config)):
+    if different := changed_fields(cell.config, describe(policies[0].config)):
         name, (there, here) = next(iter(different.items()))
         return f"these are policies of another configuration ({name} is {there!r} instead of {here!r})"
     return ""

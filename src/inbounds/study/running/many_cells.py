@@ -71,7 +71,7 @@ class Settings:
             raise ValueError(f"nice must be between 0 and 19, got {self.nice}")
 
 
-class Report(NamedTuple):
+class CellReport(NamedTuple):
     """What became of a cell.
 
     Part of what `run_study` returns, which has an example.
@@ -89,13 +89,13 @@ class Summary(NamedTuple):
     Made by `run_study`, which has an example.
     """
 
-    reports: dict[str, Report]
+    reports: dict[str, CellReport]
     """By the cell's id; cells that were not started are not in it."""
     signal: int = 0
     """The one that ended it, if one did."""
 
     @property
-    def failed(self) -> dict[str, Report]:
+    def failed(self) -> dict[str, CellReport]:
         """The cells that somebody has to do something about."""
         return {name: r for name, r in self.reports.items() if r.outcome in ("failed", "disk full", "died")}
 
@@ -149,7 +149,7 @@ class _LocalRun:
         self.folder, self.settings, self.progress = folder, settings, progress
         self.waiting = deque(cells)
         self.running: list[_Running] = []
-        self.reports: dict[str, Report] = {}
+        self.reports: dict[str, CellReport] = {}
         self.deaths: dict[str, int] = {}
         self.jobs = settings.jobs or _cores()
         minutes = settings.max_minutes
@@ -180,9 +180,9 @@ class _LocalRun:
     def _start(self, cell: Cell) -> None:
         try:
             if self.folder.state(cell) == "finished":
-                return self._report(cell, Report("was finished"))
+                return self._report(cell, CellReport("was finished"))
         except OSError as error:
-            return self._report(cell, Report("failed", f"{error}: {OTHER_FOLDERS}"))
+            return self._report(cell, CellReport("failed", f"{error}: {OTHER_FOLDERS}"))
         context = multiprocessing.get_context("spawn")  # a fork would inherit torch's threads
         receiver, sender = context.Pipe(duplex=False)
         arguments = (cell, self.folder, self.settings.nice, self.deadline, os.getpid(), sender)
@@ -209,21 +209,21 @@ class _LocalRun:
         if report is not None:
             self._report(cell, report)
 
-    def _death(self, cell: Cell, code: int) -> Report | None:
+    def _death(self, cell: Cell, code: int) -> CellReport | None:
         """Have the cell gone on with, a few times; then let somebody look."""
         if self.signal:
-            return Report("stopped")
+            return CellReport("stopped")
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         self.deaths[cell.id] = self.deaths.get(cell.id, 0) + 1
         if self.deaths[cell.id] <= RETRIES:
             self.progress.say(f"{cell.id}: its process died ({how}); going on from its last checkpoint")
             self.waiting.appendleft(cell)
             return None
-        return Report(
+        return CellReport(
             "died", f"its process died ({how}), as when memory runs out: run again, perhaps with fewer --jobs"
         )
 
-    def _report(self, cell: Cell, report: Report) -> None:
+    def _report(self, cell: Cell, report: CellReport) -> None:
         self.reports[cell.id] = report
         self.progress.done(cell, report.outcome, report.message)
         if report.outcome == "disk full":  # for the next cell too
@@ -287,20 +287,20 @@ def _each_once(messages: Sequence[str]) -> list[str]:
     return [*different[:MOST_WARNINGS], *([f"and {more} more warnings"] if more > 0 else [])]
 
 
-def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Report:
+def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> CellReport:
     """Run a cell, whatever happens, and report it."""
     try:
-        return Report(run_cell(cell, folder, stop=stop, deadline=deadline))
+        return CellReport(run_cell(cell, folder, stop=stop, deadline=deadline))
     except ClaimedError as error:
-        return Report("claimed", str(error))
+        return CellReport("claimed", str(error))
     except DiskFullError as error:
-        return Report("disk full", str(error))
+        return CellReport("disk full", str(error))
     except (StudyError, BackendError) as error:
-        return Report("failed", str(error))
+        return CellReport("failed", str(error))
     except OSError as error:
-        return Report("failed", f"{error}: {OTHER_FOLDERS}")
+        return CellReport("failed", f"{error}: {OTHER_FOLDERS}")
     except Exception:
-        return Report("failed", f"a fault of the program, please report it:\n{traceback.format_exc()}")
+        return CellReport("failed", f"a fault of the program, please report it:\n{traceback.format_exc()}")
 
 
 def commit_cell(cell: Cell, folder: StudyFolder) -> str:

@@ -23,14 +23,14 @@ from inbounds.learning.storage.files import DamagedFileError, is_disk_full
 from inbounds.learning.storage.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.grid import STUDY_VERSION, Cell
-from inbounds.study.running.cell_lock import Claim
+from inbounds.study.running.cell_lock import CellLock
 from inbounds.study.running.evaluate import GREEDY, evaluate_finally
 from inbounds.study.running.measure import MeasuredTrainer
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import StudyFolder
 
 PREVIOUS = "previous"  # folder of the checkpoint before the last
-Outcome = Literal["finished", "stopped", "was finished"]
+Ending = Literal["finished", "stopped", "was finished"]
 
 
 class StudyError(RuntimeError):
@@ -47,7 +47,7 @@ def run_cell(
     *,
     stop: Callable[[], bool] = lambda: False,
     deadline: float = float("inf"),
-) -> Outcome:
+) -> Ending:
     """Run a cell, going on from its last checkpoint, until it is finished or shall stop.
 
     Args:
@@ -76,7 +76,7 @@ def run_cell(
     if _is_finished(cell, folder):
         return "was finished"
     try:
-        with Claim.take(folder.work_of(cell)) as claim:
+        with CellLock.take(folder.work_of(cell)) as claim:
             if _is_finished(cell, folder):  # by whoever had the claim a moment ago
                 return "was finished"
             return _CellRun(cell, folder, claim).run(stop, deadline)
@@ -108,7 +108,7 @@ def _is_finished(cell: Cell, folder: StudyFolder) -> bool:
 class _CellRun:
     """A claimed cell."""
 
-    def __init__(self, cell: Cell, folder: StudyFolder, claim: Claim) -> None:
+    def __init__(self, cell: Cell, folder: StudyFolder, claim: CellLock) -> None:
         self.cell, self.folder, self.claim = cell, folder, claim
         self.work = folder.work_of(cell)
         self.run_ = MeasuredTrainer(cell)
@@ -128,7 +128,7 @@ class _CellRun:
             )
         sessions.append(now | {"from_epoch": self.kept})
 
-    def run(self, stop: Callable[[], bool], deadline: float) -> Outcome:
+    def run(self, stop: Callable[[], bool], deadline: float) -> Ending:
         """Go on until the end, or a wish to stop."""
         run, epochs = self.run_, self.cell.epochs
         self.claim.renew(epoch=run.done, epochs=epochs)

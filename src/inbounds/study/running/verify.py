@@ -34,7 +34,7 @@ WHEELS = ("torch", "mujoco", "gymnasium", "numpy", "scipy")
 NOTHING_TO_RERUN = "skipped: none of its cells is finished"
 
 
-class Finding(NamedTuple):
+class Checked(NamedTuple):
     """What a check found.
 
     Made by `verify`, which has an example.
@@ -54,8 +54,8 @@ def verify(
     *,
     epochs: int = 2,
     rerun: Sequence[Cell] | None = None,
-    on_finding: Callable[[Finding], None] = lambda finding: None,
-) -> list[Finding]:
+    on_finding: Callable[[Checked], None] = lambda finding: None,
+) -> list[Checked]:
     """Check the sums of all results, and run the first epochs of some cells again.
 
     Args:
@@ -74,9 +74,9 @@ def verify(
         >>> all(finding.ok for finding in findings)
         True
     """
-    findings: list[Finding] = []
+    findings: list[Checked] = []
 
-    def say(finding: Finding) -> None:
+    def say(finding: Checked) -> None:
         findings.append(finding)
         on_finding(finding)
 
@@ -103,34 +103,34 @@ def columns(cells: Sequence[Cell]) -> list[tuple[str, str]]:
 
 def check_column(
     cells: Sequence[Cell], folder: StudyFolder, algorithm: str, family: str, epochs: int
-) -> Finding:
+) -> Checked:
     """Run the first epochs of a column's first finished cell again; say so where it has none."""
     for cell in cells:
         if (cell.algorithm, cell.family) == (algorithm, family) and folder.state(cell) == "finished":
             return check_rerun(cell, folder, epochs)
-    return Finding(f"{algorithm} × {family}", True, NOTHING_TO_RERUN)
+    return Checked(f"{algorithm} × {family}", True, NOTHING_TO_RERUN)
 
 
-def check_sums(folder: StudyFolder) -> list[Finding]:
+def check_sums(folder: StudyFolder) -> list[Checked]:
     """Compare every listed file with its sum, and list the files that nobody lists."""
     sums = folder.checksums()
     findings = []
     for name, expected in sums.items():
         path = folder.results / name
         if not path.is_file():
-            findings.append(Finding(name, False, f"missing: {store.restore(path)}"))
+            findings.append(Checked(name, False, f"missing: {store.restore(path)}"))
         elif store.sha256(path) != expected:
-            findings.append(Finding(name, False, f"its checksum is wrong: {store.restore(path)}"))
+            findings.append(Checked(name, False, f"its checksum is wrong: {store.restore(path)}"))
     found = {path.relative_to(folder.results).as_posix() for path in _data_files(folder.results)}
     findings += [
-        Finding(name, False, f"not in {CHECKSUMS_FILE}: delete it, or restore the list")
+        Checked(name, False, f"not in {CHECKSUMS_FILE}: delete it, or restore the list")
         for name in sorted(found - sums.keys())
     ]
     good = len(sums) - sum(not finding.ok and finding.subject in sums for finding in findings)
-    return [*findings, Finding(CHECKSUMS_FILE, good > 0, f"{good} of {len(sums)} files have their checksums")]
+    return [*findings, Checked(CHECKSUMS_FILE, good > 0, f"{good} of {len(sums)} files have their checksums")]
 
 
-def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Finding]:
+def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Checked]:
     """Look into all files of each cell: whether they are listed, of the study, and hold what they must."""
     sums = folder.checksums()
     findings = []
@@ -142,9 +142,9 @@ def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Finding]:
             name = file.relative_to(folder.results).as_posix()
             if name not in sums and not file.is_file():  # else `check_sums` has seen it
                 said = f"missing, and not in {CHECKSUMS_FILE}: {store.restore(file)}"
-                findings.append(Finding(name, False, said))
+                findings.append(Checked(name, False, said))
         if said := _wrong(cell, folder):
-            findings.append(Finding(cell.id, False, said))
+            findings.append(Checked(cell.id, False, said))
     return findings
 
 
@@ -171,13 +171,13 @@ def _wrong(cell: Cell, folder: StudyFolder) -> str:
     return ""
 
 
-def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
+def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
     """Run the first epochs of a cell again and compare them with its rows."""
     path = folder.cell_file(cell)
     if not path.is_file():
-        return Finding(cell.id, False, f"there is no {path}: nothing to compare with")
+        return Checked(cell.id, False, f"there is no {path}: nothing to compare with")
     if said := _wrong(cell, folder):
-        return Finding(cell.id, False, said)
+        return Checked(cell.id, False, said)
     rows, metadata = store.read_cell(path), store.read_metadata(path)
     epochs = min(epochs, cell.epochs)
     run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
@@ -189,12 +189,12 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Finding:
         return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)
     mismatch = first_mismatch(rows.filter(pc.less(rows["epoch"], epochs)), run.table())
     if mismatch:
-        return Finding(
+        return Checked(
             cell.id,
             False,
             f"{mismatch}: the engine now gives other results; a new study version is due, or the change undone",
         )
-    return Finding(cell.id, True, f"{epochs} epochs repeated exactly")
+    return Checked(cell.id, True, f"{epochs} epochs repeated exactly")
 
 
 def _same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any]) -> bool:
@@ -227,14 +227,14 @@ def first_mismatch(expected: pa.Table, found: pa.Table) -> str:
     return ""
 
 
-def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, Any]) -> Finding:
+def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, Any]) -> Checked:
     expected = np.array(metadata["first_rewards"])
     if found.shape != expected.shape:
-        return Finding(name, False, f"rewards of shape {found.shape} instead of {expected.shape}")
+        return Checked(name, False, f"rewards of shape {found.shape} instead of {expected.shape}")
     error = float(np.max(np.abs(found - expected) / (1 + np.abs(expected)), initial=0.0))
     said = f"rewards of the first {expected.shape[1]} steps differ by at most {error:.1e} (tolerance {TOLERANCE:g})"
     ran = f"; another processor or other wheels than {metadata['sessions'][0]['processor']}: no exact comparison"
-    return Finding(name, bool(error <= TOLERANCE), said + ran)
+    return Checked(name, bool(error <= TOLERANCE), said + ran)
 
 
 def _data_files(results: Path) -> list[Path]:

@@ -29,13 +29,14 @@ from inbounds.study.statistics.comparisons import (
     holm,
     permutation_test,
 )
-from inbounds.study.statistics.covering import coverage, coverage_ceiling
 from inbounds.study.statistics.endpoints import (
     area_under_curve,
     carry_forward,
     final_score,
     normalize_scores,
 )
+from inbounds.study.statistics.equivalence_test import Equivalence, equivalence
+from inbounds.study.statistics.interval_coverage import coverage, coverage_ceiling
 from inbounds.study.statistics.intervals import (
     Estimate,
     bootstrap,
@@ -44,7 +45,6 @@ from inbounds.study.statistics.intervals import (
 )
 from inbounds.study.statistics.resolution import power, smallest_detectable_effect
 from inbounds.study.statistics.seeds import MissingSeedError
-from inbounds.study.statistics.two_one_sided import Equivalence, equivalence
 
 __all__ = [
     "Comparison",

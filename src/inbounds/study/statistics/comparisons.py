@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inbounds.study.statistics.covering import coverage_ceiling
+from inbounds.study.statistics.interval_coverage import coverage_ceiling
 from inbounds.study.statistics.intervals import (
     SPOKEN,
     Estimate,

@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from inbounds.study.statistics.covering import coverage_ceiling
+from inbounds.study.statistics.interval_coverage import coverage_ceiling
 from inbounds.study.statistics.seeds import Floats, Missing, finite_seeds
 from inbounds.study.statistics.settings import CURVE_RESAMPLES, LEVEL, RESAMPLES
 
