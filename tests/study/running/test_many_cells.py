@@ -44,7 +44,7 @@ def start(path: Path, epochs: int, jobs: int = 2) -> subprocess.Popen[str]:
     """A study in a process of its own, as a shell starts it: in its own process group."""
     script = path / "script.py"
     script.write_text(RUN.replace("EPOCHS", str(epochs)))
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     return subprocess.Popen(
         [sys.executable, str(script), str(path), str(jobs)],
         cwd=root,
@@ -58,7 +58,7 @@ def start(path: Path, epochs: int, jobs: int = 2) -> subprocess.Popen[str]:
 
 def run_script(script: str, folder: Path, timeout: float) -> subprocess.CompletedProcess[str]:
     """A script in a process of its own, with the folder as its argument, to its end."""
-    path, root = folder / "script.py", Path(__file__).parents[2]
+    path, root = folder / "script.py", Path(__file__).parents[3]
     path.write_text(script)
     return subprocess.run(
         [sys.executable, str(path), str(folder)],
@@ -205,11 +205,11 @@ def a_run(tmp_path: Path, body: str) -> str:
 
         LINES
 
-        run.attempt = attempt  # a spawned process imports this module again
+        many_cells.attempt = attempt  # a spawned process imports this module again
 
         if __name__ == "__main__":
             prepare()
-            summary = run.run_study(cells_of(1), folder_in(Path(sys.argv[1])), run.Settings(jobs=2))
+            summary = many_cells.run_study(cells_of(1), folder_in(Path(sys.argv[1])), many_cells.Settings(jobs=2))
             print(summary.signal, sorted(report.outcome for report in summary.reports.values()))
     """).replace("LINES", textwrap.dedent(body))
     done = run_script(script, tmp_path, timeout=100)
@@ -224,7 +224,7 @@ def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
         def attempt(cell, folder, stop, deadline):
             for i in range(3000):
                 warnings.warn(f"warning {i % 1000} " + 10_000 * "-")  # the first twenty are more than a pipe holds
-            return run.CellReport("finished")
+            return many_cells.CellReport("finished")
 
         def prepare():
             pass
@@ -243,10 +243,10 @@ def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> No
             end = time.monotonic() + 60
             while time.monotonic() < end and not stop():
                 time.sleep(0.05)
-            return run.CellReport("stopped" if stop() else "never told")
+            return many_cells.CellReport("stopped" if stop() else "never told")
 
         def prepare():
-            real, asked = run.StudyFolder.state, []
+            real, asked = many_cells.StudyFolder.state, []
 
             def state(folder, cell):
                 asked.append(cell)
@@ -254,7 +254,7 @@ def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> No
                     os.kill(os.getpid(), signal.SIGTERM)
                 return real(folder, cell)
 
-            run.StudyFolder.state = state
+            many_cells.StudyFolder.state = state
         """,
     )
     assert f"{signal.SIGTERM.value} ['stopped']" in said
@@ -265,17 +265,17 @@ def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
         tmp_path,
         """
         def attempt(cell, folder, stop, deadline):
-            return run.CellReport("finished")
+            return many_cells.CellReport("finished")
 
         def prepare():
-            real = run.StudyFolder.state
+            real = many_cells.StudyFolder.state
 
             def state(folder, cell):
                 if cell.family == "beta":
                     raise PermissionError("not yours")
                 return real(folder, cell)
 
-            run.StudyFolder.state = state
+            many_cells.StudyFolder.state = state
         """,
     )
     assert "not yours: choose other folders" in said

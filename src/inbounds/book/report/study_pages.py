@@ -28,9 +28,7 @@ from inbounds.learning import load_policy
 from inbounds.robots import Film, record
 from inbounds.study.ledger import CLAIMS, Finding, judge
 from inbounds.study.outcomes import Outcome, Outcomes
-from inbounds.study.store import StudyFolder
-
-ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/report/study_pages.py
+from inbounds.study.store import ROOT, StudyFolder
 
 
 def shipped(root: Path = ROOT) -> Outcomes:

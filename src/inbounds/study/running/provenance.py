@@ -13,6 +13,8 @@ from typing import Any
 
 import torch
 
+import inbounds
+
 PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "scipy", "torch")
 ENGINE = ("distributions", "robots", "learning")  # the rooms of the package that a cell's numbers come from
 
@@ -35,7 +37,7 @@ def provenance() -> dict[str, Any]:
 @functools.cache
 def engine_digest() -> str:
     """Return the SHA-256 of the engine's source."""
-    package = Path(__file__).resolve().parents[1]
+    package = Path(inbounds.__file__).parent
     digest = hashlib.sha256()
     for room in ENGINE:
         for path in sorted((package / room).rglob("*.py")):
@@ -46,7 +48,7 @@ def engine_digest() -> str:
 @functools.cache
 def commit() -> str:
     """Return the commit of the source tree, with + after it if the engine has changed since; else "unknown"."""
-    package = Path(__file__).resolve().parents[1]
+    package = Path(inbounds.__file__).parent
     try:
         head = _git(package, "rev-parse", "HEAD")
         changed = _git(package, "status", "--porcelain", "--", *ENGINE)
