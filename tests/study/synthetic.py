@@ -7,12 +7,13 @@ import numpy as np
 import pyarrow as pa
 
 from inbounds import learning
+from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.study import Cell, StudyFolder
 from inbounds.study.grid import COMPARED
 from inbounds.study.running.measure import MEASURE_EVERY
 from inbounds.study.running.one_cell import RETURNS
 from inbounds.study.running.provenance import provenance
-from inbounds.study.store import cell_metadata, parquet_bytes, table_of
+from inbounds.study.store import cell_metadata, table_of
 
 WAYS = ("mean", "median", "mode", "sample")
 

@@ -224,26 +224,6 @@ def table_of(
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
-def parquet_bytes(table: pa.Table, metadata: str) -> Any:
-    """Return a table as a Parquet file: floats without loss, their bytes split into streams, compressed by zstd."""
-    encodings = {
-        field.name: "BYTE_STREAM_SPLIT" if pa.types.is_floating(field.type) else "DELTA_BINARY_PACKED"
-        for field in table.schema
-        if pa.types.is_floating(field.type) or pa.types.is_integer(field.type)
-    }
-    sink = pa.BufferOutputStream()
-    pq.write_table(
-        table.replace_schema_metadata({METADATA_KEY: metadata}),
-        sink,
-        compression="zstd",
-        compression_level=9,
-        use_dictionary=False,
-        column_encoding=encodings,
-        write_page_checksum=True,
-    )
-    return sink.getvalue()
-
-
 def cell_metadata(cell: Cell, config: TrainConfig, **more: Any) -> str:
     """Return what a cell's file says of itself, as JSON: its configuration, its name, versions, and more."""
     cell_fields = ("arm", "algorithm", "family", "robot", "variant", "preset")

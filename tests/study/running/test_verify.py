@@ -14,6 +14,7 @@ import pytest
 import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer, ppo
 from inbounds.learning.storage.files import DamagedFileError
+from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import save_policies
 from inbounds.study import StudyFolder, read_cell, run_cell, select, store, verify
 from inbounds.study.outcomes import Outcomes
@@ -57,7 +58,7 @@ def bad(findings: list[Checked]) -> list[str]:
 def republish(folder: StudyFolder, table: pa.Table | None = None, **metadata: Any) -> None:
     path = folder.cell_file(CELL)
     about = json.dumps(store.read_metadata(path) | metadata)
-    folder.publish({path: store.parquet_bytes(read_cell(path) if table is None else table, about)})
+    folder.publish({path: parquet_bytes(read_cell(path) if table is None else table, about)})
 
 
 def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
@@ -178,7 +179,7 @@ def test_a_file_that_does_not_say_how_it_was_made_is_found(folder: StudyFolder) 
     path = folder.cell_file(CELL)
     about = store.read_metadata(path)
     del about["sessions"]
-    folder.publish({path: store.parquet_bytes(read_cell(path), json.dumps(about))})
+    folder.publish({path: parquet_bytes(read_cell(path), json.dumps(about))})
     assert "sessions is missing" in bad(verify([CELL], folder, rerun=[CELL]))[0]
 
 
@@ -203,7 +204,7 @@ def test_returns_of_the_policies_are_looked_into(folder: StudyFolder) -> None:
         (table.slice(1), "79 rows that are not mean, median, mode, sample × 2 seeds × 10 episodes"),
         (table.drop_columns(["length"]), "column length is missing"),
     ):
-        folder.publish({path: store.parquet_bytes(wrong, about)})
+        folder.publish({path: parquet_bytes(wrong, about)})
         (found,) = bad(verify([CELL], folder, rerun=()))
         assert said in found
         with pytest.raises(DamagedFileError, match=re.escape(said)):
@@ -217,7 +218,7 @@ def test_a_damaged_cell_ends_a_command_in_one_line(command: str, tmp_path: Path)
     write_cells(folder, [cell])
     path = folder.cell_file(cell)
     about = json.dumps(store.read_metadata(path))
-    folder.publish({path: store.parquet_bytes(read_cell(path).drop_columns(["return_mean"]), about)})
+    folder.publish({path: parquet_bytes(read_cell(path).drop_columns(["return_mean"]), about)})
     words = ["study", command, "--results", folder.results, "--work", folder.work]
     code, out, err = run(*words, *(["--out", tmp_path / "report.html"] if command == "report" else []))
     assert (code, out, err.count("\n")) == (1, "", 1)

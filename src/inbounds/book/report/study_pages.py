@@ -140,7 +140,7 @@ def films(outcomes: Outcomes, robot: str, algorithm: str = "ppo", seconds: float
     return _shown(f"films: {robot}, {algorithm.upper()}, one per family", parts)
 
 
-def compare(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float = 4.0) -> Shown:
+def films_of(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float = 4.0) -> Shown:
     """Return films of chosen cells' final policies, as `films` shows those of one robot.
 
     Args:

@@ -16,6 +16,7 @@ from inbounds.learning.storage.stored_config import describe
 
 METADATA_KEY = "inbounds"
 FORMAT = 1
+PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "scipy", "torch")
 
 
 def metadata_of(config: TrainConfig, **more: str) -> str:
@@ -25,9 +26,12 @@ def metadata_of(config: TrainConfig, **more: str) -> str:
         config: of the run.
         **more: further entries.
     """
-    packages = ("gymnasium", "inbounds", "mujoco", "numpy", "torch")
-    versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
-    return json.dumps({"format": FORMAT, "config": describe(config), "versions": versions} | more)
+    return json.dumps({"format": FORMAT, "config": describe(config), "versions": versions()} | more)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that decide the bits of a result."""
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 def config_from(metadata: Mapping[str, Any]) -> TrainConfig:

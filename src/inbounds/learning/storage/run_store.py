@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.files import damaged, find, write_whole
+from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_files import METADATA_KEY, config_from, metadata_of
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 
@@ -105,26 +106,15 @@ def write_curves(path: str | Path, config: TrainConfig, records: Sequence[Mappin
     """
     num_seeds = len(config.seeds)
     known = [name for name in COLUMNS if name in records[0] or name == "seed"]
-    fields, arrays, encodings = [], [], {}
+    fields, arrays = [], []
     for name in [*known, *sorted(records[0].keys() - COLUMNS.keys())]:
         kind, meaning = COLUMNS.get(name, (pa.float64(), ""))
         per_epoch = [config.seeds] * len(records) if name == "seed" else [record[name] for record in records]
         values = np.concatenate([np.broadcast_to(value, num_seeds) for value in per_epoch])
         fields.append(pa.field(name, kind, nullable=False, metadata={"meaning": meaning}))
         arrays.append(pa.array(values, kind, from_pandas=False))
-        if not pa.types.is_boolean(kind):
-            encodings[name] = "BYTE_STREAM_SPLIT" if pa.types.is_floating(kind) else "DELTA_BINARY_PACKED"
-    schema = pa.schema(fields, metadata={METADATA_KEY: metadata_of(config)})
-    sink = pa.BufferOutputStream()
-    pq.write_table(
-        pa.Table.from_arrays(arrays, schema=schema),
-        sink,
-        compression="zstd",
-        use_dictionary=False,
-        column_encoding=encodings,
-        write_page_checksum=True,
-    )
-    write_whole(Path(path), sink.getvalue())
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    write_whole(Path(path), parquet_bytes(table, metadata_of(config)))
 
 
 def read_curves(run: str | Path) -> pa.Table:

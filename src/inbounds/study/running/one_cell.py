@@ -20,6 +20,7 @@ import safetensors
 
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.files import DamagedFileError, is_disk_full
+from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import load_checkpoint, save_policies
 from inbounds.study import store
 from inbounds.study.grid import STUDY_VERSION, Cell
@@ -206,7 +207,7 @@ class _CellRun:
             rows = evaluate_finally(run.trainer)
             run.progress.seconds["final evaluation"] = time.perf_counter() - start
             contents[policies] = temporary.read_bytes()
-            contents[returns] = store.parquet_bytes(
+            contents[returns] = parquet_bytes(
                 pa.Table.from_pylist(rows, RETURNS), store.cell_metadata(cell, run.config)
             )
         self._tick()
@@ -219,7 +220,7 @@ class _CellRun:
             seconds=progress.seconds,
             first_rewards=progress.first_rewards.tolist(),
         )
-        contents[folder.cell_file(cell)] = store.parquet_bytes(run.table(), metadata)
+        contents[folder.cell_file(cell)] = parquet_bytes(run.table(), metadata)
         self.claim.check()
         folder.publish(contents)
         for path in (self.work / checkpoint.FILE_NAME, self.work / PREVIOUS / checkpoint.FILE_NAME):

@@ -7,15 +7,14 @@ import hashlib
 import platform
 import re
 import subprocess
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import torch
 
 import inbounds
+from inbounds.learning.storage.run_files import versions
 
-PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "scipy", "torch")
 ENGINE = ("distributions", "robots", "learning")  # the rooms of the package that a cell's numbers come from
 
 
@@ -29,7 +28,7 @@ def provenance() -> dict[str, Any]:
     return {
         "commit": commit(),
         "engine": engine_digest(),
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in PACKAGES},
+        "versions": versions(),
         "processor": processor(),
     }
 
