@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
+from inbounds.book.drawing import figures
 from inbounds.book.explorables.greedy_action import CENTRES, GreedyActions, greedy_actions
+from tests.book.colour_vision import GROUNDS, VISION, assert_looks_differ, cie_lab, linear_rgb
 from tests.book.explorables.test_bounded_densities import run_js
 
 # Both sides of the bimodality condition, both signs, the sliders' ends.
@@ -103,3 +105,15 @@ def test_static_figure() -> None:
 def test_values_outside_the_sliders_are_refused(mu: float, sigma: float) -> None:
     with pytest.raises(ValueError, match="choose mu in"):
         greedy_actions(mu, sigma)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_looks_differ_and_none_is_a_family_s(ground: str) -> None:
+    """With every kind of colour vision: the logit-normal's density lies in the same picture."""
+    assert_looks_differ(CENTRES.values(), ground, lightness_gap=7)
+    key = "color" if ground == "white" else "color_on_dark"
+    for centre, family in itertools.product(CENTRES.values(), figures.LOOKS.values()):
+        mine, other = (linear_rgb(getattr(look, key)) for look in (centre, family))
+        for vision in VISION.values():
+            gap = np.linalg.norm(cie_lab(vision @ mine) - cie_lab(vision @ other))
+            assert gap > 20, (centre.label, family.label)

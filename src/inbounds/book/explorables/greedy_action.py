@@ -30,9 +30,9 @@ __all__ = ["CENTRES", "GreedyActions", "greedy_actions"]
 
 CENTRES: Mapping[str, figures.FamilyStyle] = MappingProxyType(
     {
-        "mean": figures.FamilyStyle("mean", "#6A3D8F", "#B99AE8", ":", "^"),
-        "median": figures.FamilyStyle("median", "#C1477C", "#F08CB8", "-", "o"),
-        "mode": figures.FamilyStyle("mode", "#5F6770", "#B4BCC6", "--", "s"),
+        "mean": figures.FamilyStyle("mean", figures.SHADES[1], "#D0C8F8", ":", "^"),
+        "median": figures.FamilyStyle("median", figures.SHADES[2], "#A840F8", "-", "o"),
+        "mode": figures.FamilyStyle("mode", figures.SHADES[0], "#E07878", "--", "s"),
     }
 )
 """The three centres and the look of each, throughout the chapter."""
