@@ -16,8 +16,8 @@ from inbounds.cli import main
 from inbounds.cli.progress import TrainingProgress
 from inbounds.learning import Trainer
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import is_disk_full
 from inbounds.learning.storage.run_store import load_checkpoint, load_policies, read_curves
+from inbounds.learning.storage.whole_files import is_disk_full
 from tests.cli.small import contents, run, same_rows, small, succeeds
 
 FILES = {"checkpoint.pt", "curves.parquet", "policies.safetensors"}

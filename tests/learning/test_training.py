@@ -15,7 +15,7 @@ import torch
 
 from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, train
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import DamagedFileError, held
+from inbounds.learning.storage.whole_files import DamagedFileError, held
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 

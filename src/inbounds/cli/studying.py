@@ -12,7 +12,7 @@ import tyro
 from rich.console import Console
 from tyro.conf import Positional, arg, subcommand
 
-from inbounds.learning.storage.files import DamagedFileError
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes

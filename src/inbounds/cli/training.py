@@ -23,7 +23,6 @@ from inbounds.headless import BackendError
 from inbounds.learning import TrainConfig, Trainer, train
 from inbounds.learning.rollout import check_environments
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import DamagedFileError, held, is_disk_full
 from inbounds.learning.storage.run_store import (
     CHECKPOINT_FILE,
     CURVES_FILE,
@@ -32,6 +31,7 @@ from inbounds.learning.storage.run_store import (
     save_run,
 )
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields
+from inbounds.learning.storage.whole_files import DamagedFileError, held, is_disk_full
 from inbounds.learning.training import Record, make_environments
 from inbounds.robots.registration import TASK_NAMES
 

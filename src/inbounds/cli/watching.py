@@ -17,9 +17,9 @@ from inbounds.cli.errors import CommandError, is_ours
 from inbounds.cli.modules import find_modules_here, module_of
 from inbounds.cli.options import Watch, quoted
 from inbounds.headless import BackendError
-from inbounds.learning.storage.files import is_disk_full
 from inbounds.learning.storage.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.storage.trained_policy import TrainedPolicy
+from inbounds.learning.storage.whole_files import is_disk_full
 from inbounds.learning.training import make_environments
 
 

@@ -36,9 +36,9 @@ from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.rollout import Collector, Rollout, check_environments
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import held
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
+from inbounds.learning.storage.whole_files import held
 from inbounds.robots.registration import TASK_NAMES
 
 Record: TypeAlias = dict[str, Any]

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from inbounds.study import store
 from inbounds.study.grid import ARMS, Cell, study_cells
-from inbounds.study.running import contents
 from inbounds.study.statistics import carry_forward
 from inbounds.study.store import State, StudyFolder
 
@@ -213,8 +212,10 @@ class Outcomes:
         for cell in cells:
             if states[cell.id] == "finished":
                 path, returns_path = folder.cell_file(cell), folder.policy_files(cell)[1]
-                table = _whole(path, contents.wrong_rows, cell)
-                returns = _whole(returns_path, contents.wrong_returns, cell) if cell.keeps_policies else None
+                table = _whole(path, file_checks.wrong_rows, cell)
+                returns = (
+                    _whole(returns_path, file_checks.wrong_returns, cell) if cell.keeps_policies else None
+                )
                 finished[cell.id] = Outcome.of(cell, table, store.read_metadata(path), returns)
         return cls(finished, states, folder)
 

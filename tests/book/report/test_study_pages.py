@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inbounds.book.report import ledger as report_ledger
+from inbounds.book.report import ledger_table as report_ledger
 from inbounds.book.report import study_pages
 from inbounds.book.report.html_output import Shown
-from inbounds.book.report.results import PUBLISHED, THESIS
+from inbounds.book.report.score_tables import PUBLISHED, THESIS
 from inbounds.book.report.study_report import GROUPS, write_report
 from inbounds.book.report.words import pair_name, spoken, verdict
 from inbounds.study import analysis, select

@@ -12,8 +12,7 @@ from scipy import stats
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Trainer, preset
-from inbounds.learning.storage.files import DamagedFileError, write_whole
-from inbounds.learning.storage.run_files import config_from, metadata_of
+from inbounds.learning.storage.run_metadata import config_from, metadata_of
 from inbounds.learning.storage.run_store import (
     COLUMNS,
     config_of,
@@ -24,6 +23,7 @@ from inbounds.learning.storage.run_store import (
     read_curves,
     save_run,
 )
+from inbounds.learning.storage.whole_files import DamagedFileError, write_whole
 from tests.learning.small import ALGORITHMS, FAMILIES, rng, small_config, small_run
 
 

@@ -13,9 +13,9 @@ import pytest
 
 import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer, ppo
-from inbounds.learning.storage.files import DamagedFileError
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import save_policies
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import StudyFolder, read_cell, run_cell, select, store, verify
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running import evaluate

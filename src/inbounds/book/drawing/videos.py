@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inbounds.learning.storage.files import write_whole
+from inbounds.learning.storage.whole_files import write_whole
 
 if TYPE_CHECKING:  # what encodes a film needs no MuJoCo
     from inbounds.robots.rendering import Film

@@ -17,12 +17,12 @@ import numpy as np
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.drawing.videos import show_films
-from inbounds.book.report import arms as report_arms
+from inbounds.book.report import arm_sections as report_arms
 from inbounds.book.report import html, study_report
-from inbounds.book.report import ledger as report_ledger
-from inbounds.book.report import results as report_results
+from inbounds.book.report import ledger_table as report_ledger
+from inbounds.book.report import score_tables as report_results
 from inbounds.book.report.aggregates import aggregates, columns_of
-from inbounds.book.report.arms import Cells
+from inbounds.book.report.arm_sections import Cells
 from inbounds.book.report.html_output import Shown
 from inbounds.learning import load_policy
 from inbounds.robots import Film, record

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
-from inbounds.book.report.arms import HEADS, NONE_FINISHED, TITLES, arm_section
-from inbounds.book.report.ledger import ledger_section
+from inbounds.book.report.arm_sections import HEADS, NONE_FINISHED, TITLES, arm_section
+from inbounds.book.report.ledger_table import ledger_section
 from inbounds.book.report.study_figures import interval_panels
 from inbounds.book.report.words import spoken
-from inbounds.learning.storage.files import write_whole
+from inbounds.learning.storage.whole_files import write_whole
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
 from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, STUDY_VERSION, Cell

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from inbounds.learning.storage.files import damaged, write_whole
+from inbounds.learning.storage.whole_files import damaged, write_whole
 
 FILE_NAME = "checkpoint.pt"
 

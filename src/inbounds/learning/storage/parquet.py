@@ -7,7 +7,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from inbounds.learning.storage.run_files import METADATA_KEY
+from inbounds.learning.storage.run_metadata import METADATA_KEY
 
 
 def parquet_bytes(table: pa.Table, metadata: str) -> Any:

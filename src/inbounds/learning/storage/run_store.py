@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import damaged, find, write_whole
 from inbounds.learning.storage.parquet import parquet_bytes
-from inbounds.learning.storage.run_files import METADATA_KEY, config_from, metadata_of
+from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
+from inbounds.learning.storage.whole_files import damaged, find, write_whole
 
 CHECKPOINT_FILE = checkpoint.FILE_NAME
 CURVES_FILE = "curves.parquet"

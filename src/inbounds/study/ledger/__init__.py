@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from inbounds.study.ledger.reasons import CAUSES, PARTS, TRUST
-from inbounds.study.ledger.results import STARTS, SWIMMER, WINS
+from inbounds.study.ledger.claims_on_reasons import CAUSES, PARTS, TRUST
+from inbounds.study.ledger.claims_on_results import STARTS, SWIMMER, WINS
 from inbounds.study.ledger.verdicts import Claim, Finding, Statement, count, judge, possible_verdicts
 
 __all__ = ["CLAIMS", "Claim", "Finding", "Statement", "claims_named", "count", "judge", "possible_verdicts"]

@@ -19,9 +19,9 @@ import pyarrow as pa
 import safetensors
 
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.files import DamagedFileError, is_disk_full
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import load_checkpoint, save_policies
+from inbounds.learning.storage.whole_files import DamagedFileError, is_disk_full
 from inbounds.study import store
 from inbounds.study.grid import STUDY_VERSION, Cell
 from inbounds.study.running.cell_lock import CellLock

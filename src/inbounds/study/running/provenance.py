@@ -13,7 +13,7 @@ from typing import Any
 import torch
 
 import inbounds
-from inbounds.learning.storage.run_files import versions
+from inbounds.learning.storage.run_metadata import versions
 
 ENGINE = ("distributions", "robots", "learning")  # the rooms of the package that a cell's numbers come from
 

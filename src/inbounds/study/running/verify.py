@@ -17,10 +17,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from inbounds.learning.storage.files import DamagedFileError
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import store
 from inbounds.study.grid import Cell
-from inbounds.study.running import contents
 from inbounds.study.running.measure import MeasuredTrainer
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import CHECKSUMS_FILE, StudyFolder
@@ -151,9 +150,9 @@ def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Checked]:
 def _wrong(cell: Cell, folder: StudyFolder) -> str:
     """What is wrong with the contents of a cell's files, the first thing; empty where nothing is."""
     path, (policies, returns) = folder.cell_file(cell), folder.policy_files(cell)
-    tables: list[tuple[Path, Callable[[Cell, pa.Table], str]]] = [(path, contents.wrong_rows)]
+    tables: list[tuple[Path, Callable[[Cell, pa.Table], str]]] = [(path, file_checks.wrong_rows)]
     if cell.keeps_policies and returns.is_file():
-        tables.append((returns, contents.wrong_returns))
+        tables.append((returns, file_checks.wrong_returns))
     for file, look in tables:
         try:
             metadata, table = store.read_metadata(file), store.read_cell(file)
@@ -166,7 +165,7 @@ def _wrong(cell: Cell, folder: StudyFolder) -> str:
             return f"{file} does not say how it was made ({lost[0]} is missing): {store.restore(file)}"
         if said := look(cell, table):
             return f"{file}: {said}: {store.restore(file)}"
-    if cell.keeps_policies and policies.is_file() and (said := contents.wrong_policies(cell, policies)):
+    if cell.keeps_policies and policies.is_file() and (said := file_checks.wrong_policies(cell, policies)):
         return f"{policies}: {said}: {store.restore(policies)}"
     return ""
 

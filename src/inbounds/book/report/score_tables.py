@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from inbounds.book.report import html
 from inbounds.book.report.aggregates import HEADS
-from inbounds.book.report.arms import title_of
+from inbounds.book.report.arm_sections import title_of
 from inbounds.book.report.words import p_equals, pair_name, spoken, verdict
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS
