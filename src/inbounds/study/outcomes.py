@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from inbounds.study import store
 from inbounds.study.grid import ARMS, Cell, study_cells
+from inbounds.study.running import file_checks
 from inbounds.study.statistics import carry_forward
 from inbounds.study.store import State, StudyFolder
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import store
 from inbounds.study.grid import Cell
+from inbounds.study.running import file_checks
 from inbounds.study.running.measure import MeasuredTrainer
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import CHECKSUMS_FILE, StudyFolder
