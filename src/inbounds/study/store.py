@@ -24,11 +24,10 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
-from inbounds.learning.storage.files import DamagedFileError, write_whole
+from inbounds.learning.storage.files import DamagedFileError, file_lock, write_whole
 from inbounds.learning.storage.run_files import METADATA_KEY, metadata_of
 from inbounds.learning.storage.stored_config import changed_fields
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
-from inbounds.study.running.cell_lock import file_lock
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
