@@ -399,8 +399,8 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "nobody waits for a lock",
-        "study/running/cell_lock.py",
-        "fcntl.flock(file, fcntl.LOCK_EX)",
+        "learning/storage/whole_files.py",
+        "lock.acquire(blocking=wait)",
         "pass",
         "tests/study/running/test_cell_lock.py::test_of_many_exactly_one_takes_over",
     ),

@@ -17,10 +17,19 @@ from inbounds.cli.progress import TrainingProgress
 from inbounds.learning import Trainer
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import load_checkpoint, load_policies, read_curves
-from inbounds.learning.storage.whole_files import is_disk_full
+from inbounds.learning.storage.whole_files import LOCK_FILE, is_disk_full
 from tests.cli.small import contents, run, same_rows, small, succeeds
 
 FILES = {"checkpoint.pt", "curves.parquet", "policies.safetensors"}
+
+HOLD = """
+import sys
+from pathlib import Path
+from inbounds.learning.storage.whole_files import held
+with held(Path(sys.argv[1])):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
 
 
 def test_a_run_leaves_curves_policies_and_a_checkpoint(tmp_path: Path) -> None:
@@ -311,17 +320,19 @@ def test_where_no_run_directory_can_be(tmp_path: Path) -> None:
 
 
 def test_two_processes_do_not_train_in_one_directory(tmp_path: Path) -> None:
-    fcntl = pytest.importorskip("fcntl")
-    descriptor = os.open(tmp_path, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
         code, _, err = run(*small(tmp_path))
-    finally:
-        os.close(descriptor)
-    assert code == 1
-    assert "another process trains" in err
-    assert not list(tmp_path.iterdir())
-    succeeds(small(tmp_path, 1))
+        assert code == 1
+        assert "another process trains" in err
+        assert contents(tmp_path).keys() == {LOCK_FILE}
+        holder.kill()
+    succeeds(small(tmp_path, 1))  # the dead hold nothing
+    assert contents(tmp_path).keys() == FILES
 
 
 # ---- TensorBoard

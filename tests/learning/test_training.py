@@ -332,13 +332,13 @@ def test_two_do_not_train_in_one_folder(tmp_path: Path) -> None:
         thread.start()
         thread.join()
 
-    pytest.importorskip("fcntl")
     train(config, run_dir=tmp_path, make_envs=PointEnv, callback=intrude)
     assert refused == [
         f"another process or thread trains in {tmp_path}: wait until it is done, or choose another run_dir"
     ]
     intrude()  # the folder is free again, and the run in it done
     assert len(refused) == 1
+    assert [file.name for file in tmp_path.iterdir()] == [checkpoint.FILE_NAME]
     with held(tmp_path):  # who holds it may train in it
         assert train(config, run_dir=tmp_path, make_envs=PointEnv).finished
         intrude()  # and holds it still

@@ -16,7 +16,8 @@ from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.running.many_cells import Settings, run_study
+from inbounds.study.running.attempts import Settings
+from inbounds.study.running.many_cells import run_study
 from inbounds.study.running.one_cell import StudyError
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
 from inbounds.study.running.verify import Checked, verify

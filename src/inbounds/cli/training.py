@@ -245,6 +245,7 @@ def _claimed(run_dir: Path) -> Iterator[None]:
     """Make the run directory and hold it, so that no second process trains in it at the same time."""
     new = [path for path in (run_dir, *run_dir.parents) if not path.exists()]
     with contextlib.ExitStack() as stack:
+        stack.callback(_remove_empty, new)
         try:
             run_dir.mkdir(parents=True, exist_ok=True)
             stack.enter_context(held(run_dir))
@@ -257,9 +258,10 @@ def _claimed(run_dir: Path) -> Iterator[None]:
             raise CommandError(
                 f"{run_dir} cannot be a run directory ({said}): choose another --out"
             ) from error
-        try:
-            yield
-        finally:
-            for path in new:
-                with contextlib.suppress(OSError):  # something came of it
-                    path.rmdir()
+        yield
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        with contextlib.suppress(OSError):  # something came of it
+            folder.rmdir()

@@ -26,9 +26,8 @@ from numpy.typing import NDArray
 from inbounds.learning import TrainConfig
 from inbounds.learning.storage.run_metadata import METADATA_KEY, metadata_of
 from inbounds.learning.storage.stored_config import changed_fields
-from inbounds.learning.storage.whole_files import DamagedFileError, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, file_lock, write_whole
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
-from inbounds.study.running.cell_lock import file_lock
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"

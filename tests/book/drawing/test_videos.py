@@ -163,5 +163,5 @@ def test_missing_ffmpeg_names_the_fix(monkeypatch):
 
 def test_missing_mediapy_names_the_fix(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapy", None)
-    with pytest.raises(RuntimeError, match=r"mediapy: pip install '\.\[book\]'"):
+    with pytest.raises(RuntimeError, match=r"mediapy: pip install '\.\[video\]'"):
         videos.show_films({"One": film()})

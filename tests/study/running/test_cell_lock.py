@@ -35,7 +35,7 @@ os._exit(9)
 LOCK = """
 import sys
 from pathlib import Path
-from inbounds.study.running.cell_lock import file_lock
+from inbounds.learning.storage.whole_files import file_lock
 with file_lock(Path(sys.argv[1], ".guard")):
     print("locked", flush=True)
     sys.stdin.read()

@@ -48,7 +48,7 @@ def start(path: Path, epochs: int, jobs: int = 2) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, str(script), str(path), str(jobs)],
         cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
+        env=os.environ | {"PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -63,7 +63,7 @@ def run_script(script: str, folder: Path, timeout: float) -> subprocess.Complete
     return subprocess.run(
         [sys.executable, str(path), str(folder)],
         cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
+        env=os.environ | {"PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"},
         capture_output=True,
         text=True,
         timeout=timeout,

@@ -248,7 +248,7 @@ def _mediapy() -> Any:
         import imageio_ffmpeg
         import mediapy
     except ImportError as error:
-        raise RuntimeError(f"Videos need {error.name}: pip install '.[book]' in the source tree") from error
+        raise RuntimeError(f"Videos need {error.name}: pip install '.[video]' in the source tree") from error
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError as error:

@@ -7,10 +7,13 @@ import errno
 import os
 import secrets
 import shlex
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from filelock import BaseFileLock, FileLock, Timeout
+
+LOCK_FILE = ".lock"  # in a directory that somebody writes a run into
 
 
 class DamagedFileError(ValueError):
@@ -106,19 +109,43 @@ def write_whole(path: Path, data: Any) -> None:
         raise
 
 
-_holders: dict[tuple[int, int], int] = {}
-"""Thread by device and inode of the directory that it holds."""
+@contextlib.contextmanager
+def file_lock(path: Path, *, wait: bool = True) -> Iterator[BaseFileLock]:
+    """Hold a lock on a file, against every other process and every other thread.
+
+    A thread may hold again what it holds. The death of a process lets go of all that it held.
+
+    Args:
+        path: of the file, which is made and stays; its folder must exist.
+        wait: for whoever has it.
+
+    Raises:
+        BlockingIOError: somebody else has it, and we do not wait.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder, file_lock(Path(folder) / ".lock") as lock:
+        ...     lock.is_locked
+        True
+    """
+    path.parent.stat()  # the library would make a folder that is missing
+    lock = FileLock(path, is_singleton=True, fallback_to_soft=False)
+    try:
+        lock.acquire(blocking=wait)
+    except Timeout as error:
+        raise BlockingIOError(errno.EWOULDBLOCK, "somebody else holds it", str(path)) from error
+    try:
+        yield lock
+    finally:
+        lock.release()
 
 
 @contextlib.contextmanager
 def held(directory: Path) -> Iterator[None]:
-    """Hold a directory, so that nobody else writes a run into it: no other process on this machine, no other thread.
-
-    A thread may hold again what it holds. The death of a process lets go of all that it held. On Windows, which has no
-    such lock, nothing is held: there the user sees to it.
+    """Hold a directory, so that nobody else writes a run into it: no other process, no other thread.
 
     Args:
-        directory: it must exist.
+        directory: it must exist; while it is held, there is a file `.lock` in it.
 
     Raises:
         BlockingIOError: somebody else holds it.
@@ -128,18 +155,13 @@ def held(directory: Path) -> Iterator[None]:
         >>> with tempfile.TemporaryDirectory() as folder, held(Path(folder)):
         ...     write_whole(Path(folder) / "file", b"mine")
     """
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
-    with contextlib.ExitStack() as stack:
-        descriptor = os.open(directory, os.O_RDONLY)
-        stack.callback(os.close, descriptor)
-        state = os.fstat(descriptor)
-        place, thread = (state.st_dev, state.st_ino), threading.get_ident()
-        if _holders.get(place) != thread:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            _holders[place] = thread
-            stack.callback(_holders.pop, place)
-        yield
+    path = directory.resolve() / LOCK_FILE
+    with file_lock(path, wait=False) as lock:
+        try:
+            yield
+        finally:
+            if lock.lock_counter == 1:
+                # Before it is let go: whoever opened the file meanwhile finds that it has lost its name, and makes
+                # another. On Windows a file in use cannot be removed; there the library does it afterwards.
+                with contextlib.suppress(OSError):
+                    path.unlink()

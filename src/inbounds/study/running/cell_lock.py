@@ -13,9 +13,11 @@ import json
 import os
 import platform
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
+
+from inbounds.learning.storage.whole_files import file_lock
 
 FILE_NAME = "claim.json"
 SILENCE = 900.0  # seconds; an epoch takes tens of seconds at most, a final evaluation minutes
@@ -148,21 +150,6 @@ def _started(pid: int) -> str:
     return "dead" if fields[0] in "ZX" else fields[19]
 
 
-@contextlib.contextmanager
-def _guard(folder: Path) -> Iterator[None]:
-    """Hold the folder's file lock; the kernel drops it when the process dies."""
-    with file_lock(folder / ".guard"):
-        yield
-
-
-@contextlib.contextmanager
-def file_lock(path: Path) -> Iterator[None]:
-    """Hold an exclusive lock on a file, waiting for whoever has it."""
-    try:
-        import fcntl
-    except ImportError:  # Windows has no such lock: there the user sees to it that one process runs at a time
-        yield
-        return
-    with open(path, "a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+def _guard(folder: Path) -> contextlib.AbstractContextManager[object]:
+    """Hold the folder's file lock; it falls when the process dies."""
+    return file_lock(folder / ".guard")

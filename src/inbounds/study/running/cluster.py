@@ -21,14 +21,13 @@ import os
 import time
 from collections.abc import Sequence
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from inbounds.study.grid import Cell
+from inbounds.study.running.attempts import RETRIES, CellReport, Settings, Summary, attempt, handling
+from inbounds.study.running.one_cell import StudyError
+from inbounds.study.running.progress import StudyProgress
 from inbounds.study.store import StudyFolder
-
-if TYPE_CHECKING:
-    from inbounds.study.running.many_cells import CellReport, Settings, Summary
-    from inbounds.study.running.progress import StudyProgress
 
 PAUSE = 5.0  # seconds until a cell is tried again that is still claimed, perhaps by a worker that is dead
 
@@ -41,8 +40,6 @@ def run_on_cluster(
     Raises:
         StudyError: distributed is not installed, or the scheduler does not answer.
     """
-    from inbounds.study.running.many_cells import Summary, handling
-
     shared = StudyFolder(folder.results.resolve(), folder.work.resolve())
     minutes = settings.max_minutes
     deadline = float("inf") if minutes is None else time.time() + 60 * minutes
@@ -81,8 +78,6 @@ def _run(
     """Submit every cell, and again while somebody who may be dead claims it."""
     from distributed import TimeoutError as NothingYet
     from distributed import wait
-
-    from inbounds.study.running.many_cells import RETRIES, CellReport
 
     def submit(cell: Cell, number: int) -> Any:
         # Names make tasks unique: a cell that was claimed a moment ago is another task now.
@@ -124,8 +119,6 @@ def _run(
 
 def run_on_worker(cell: Cell, folder: StudyFolder, nice: int, deadline: float, stop_file: str) -> CellReport:
     """Run a cell in a worker; the wish to stop is a file."""
-    from inbounds.study.running.many_cells import CellReport, attempt
-
     if os.path.exists(stop_file) or time.time() > deadline:
         return CellReport("stopped")
     with contextlib.suppress(OSError):
@@ -134,8 +127,6 @@ def run_on_worker(cell: Cell, folder: StudyFolder, nice: int, deadline: float, s
 
 
 def _client(address: str) -> Any:
-    from inbounds.study.running.one_cell import StudyError
-
     try:
         from distributed import Client
     except ImportError as error:
