@@ -76,7 +76,7 @@ def describe(
 ) -> None:
     """Add the tags to a page."""
     description = shorten(first_words(doctree) or app.config.book_description)
-    title = html.unescape(re.sub(r"<[^>]*>", "", context.get("title") or app.config.project))
+    title = html.unescape(re.sub(r"<[^>]*>", "", context.get("title") or app.config.html_title))
     if pagename == NOT_FOUND:
         site = app.config.html_baseurl.rstrip("/")
         base = f'<base href="{html.escape(site)}/" />' if site else GUESSED_BASE

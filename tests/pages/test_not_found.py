@@ -20,7 +20,7 @@ def test_wrong_address_leads_back(context: BrowserContext, address: str, wrong: 
     assert len(needed) > 5
     assert set(needed) <= arrived
     page.get_by_role("link", name="first page").click()
-    assert page.url == address + "book/preface.html"
+    assert page.url == address + "notebooks/front_page.html"
 
 
 def test_nothing_lists_it() -> None:
@@ -33,6 +33,6 @@ def test_nothing_lists_it() -> None:
 def test_first_address_is_described() -> None:
     """What a service reads of a link to the site itself, which redirects."""
     text = (book.HTML / "index.html").read_text(encoding="utf-8")
-    assert 'http-equiv="Refresh" content="0; url=book/preface.html"' in text
+    assert 'http-equiv="Refresh" content="0; url=notebooks/front_page.html"' in text
     assert '<meta property="og:title" content="In Bounds' in text
     assert '<meta name="description" content="' in text
