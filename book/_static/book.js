@@ -37,7 +37,11 @@
   addEventListener("load", async () => {
     await window.MathJax?.startup?.promise;
     allowBreaks();
+    await document.fonts.ready;
+    const scrollers = document.querySelectorAll(SCROLLERS);
     const sizes = new ResizeObserver((entries) => entries.forEach((entry) => update(entry.target)));
-    document.querySelectorAll(SCROLLERS).forEach((node) => sizes.observe(node));
+    scrollers.forEach((node) => sizes.observe(node));
+    /* What is inside may change its width while the box around it does not. */
+    addEventListener("resize", () => setTimeout(() => scrollers.forEach(update), 200));
   });
 })();

@@ -130,6 +130,15 @@ def test_formulas_in_text_are_not_cut_off(visit: Visit, width: str) -> None:
     assert visit.page.eval_on_selector_all("article span.math", cut) == []
 
 
+def at_rest(visit: Visit, selector: str, script: str) -> list[str]:
+    """What a script finds, within five seconds: theme and book look again a moment after the width has changed."""
+    for _ in range(50):
+        if not (found := visit.page.eval_on_selector_all(selector, script)):
+            break
+        visit.page.wait_for_timeout(100)
+    return found
+
+
 @pytest.mark.parametrize("width", ["desktop", "phone"])
 def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit, width: str) -> None:
     visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
@@ -139,7 +148,7 @@ def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit, width:
       .filter((node) => node.tabIndex !== 0 || !(node.caption?.textContent ?? node.ariaLabel)?.trim())
       .map((node) => node.outerHTML.slice(0, 120))"""
     tables = "article table:not(.inbounds-explorable table), article mjx-container"
-    assert visit.page.eval_on_selector_all(tables, unnamed) == []
+    assert at_rest(visit, tables, unnamed) == []
 
 
 def test_only_controls_and_what_scrolls_are_tab_stops(visit: Visit) -> None:
@@ -149,11 +158,7 @@ def test_only_controls_and_what_scrolls_are_tab_stops(visit: Visit) -> None:
         && !node.matches('a, button, input, select, textarea, summary, video, [role=slider], [role=button]')
         && node.scrollWidth <= node.clientWidth && node.scrollHeight <= node.clientHeight)
       .map((node) => node.outerHTML.slice(0, 120))"""
-    for _ in range(50):  # both the theme and the book look again a moment after the width has changed
-        if not (found := visit.page.eval_on_selector_all("[tabindex]", others)):
-            break
-        visit.page.wait_for_timeout(100)
-    assert found == []
+    assert at_rest(visit, "[tabindex]", others) == []
 
 
 def test_page_describes_itself(visit: Visit) -> None:
