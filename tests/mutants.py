@@ -178,7 +178,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "book/exercises/judging.py",
         "        if agrees(answer, case.expected, case.rtol):\n            continue",
         "        if agrees(answer, case.expected, 1e9):\n            continue",
-        "tests/book/exercises/test_judging.py::test_known_mistakes_are_named",
+        "tests/book/exercises/test_judging.py::test_right_known_and_unknown_mistakes",
     ),
     Mutant(
         "truncation comes a step late",

@@ -97,15 +97,15 @@ def test_every_cell_has_the_full_length() -> None:
 def test_an_option_that_came_later_had_its_default() -> None:
     config = Cell("test", "ppo", "beta", "Hopper").config
     stored = json.loads(json.dumps(describe(config)))
-    assert stored_config.differences(config, stored) == {}
+    assert stored_config.changed_fields(config, stored) == {}
     del stored["normalize_obs"], stored["algorithm"]["gamma"], stored["policy"]["limits"]
     later = dataclasses.replace(config, algorithm=dataclasses.replace(config.algorithm, gamma=0.9))
-    assert stored_config.differences(config, stored) == {}
+    assert stored_config.changed_fields(config, stored) == {}
     later = dataclasses.replace(later, normalize_obs=False)
-    assert list(stored_config.differences(later, stored)) == ["algorithm.gamma", "normalize_obs"]
-    assert stored_config.differences(config, stored | {"env": "Ant-v5"}) == {"env": ("Ant-v5", "Hopper-v5")}
-    assert stored_config.differences(config, stored | {"new": 1}) == {"new": (1, "absent")}
-    assert "epochs" in stored_config.differences(dataclasses.replace(config, epochs=9), stored)
+    assert list(stored_config.changed_fields(later, stored)) == ["algorithm.gamma", "normalize_obs"]
+    assert stored_config.changed_fields(config, stored | {"env": "Ant-v5"}) == {"env": ("Ant-v5", "Hopper-v5")}
+    assert stored_config.changed_fields(config, stored | {"new": 1}) == {"new": (1, "absent")}
+    assert "epochs" in stored_config.changed_fields(dataclasses.replace(config, epochs=9), stored)
 
 
 def test_printed_cells_are_the_preset() -> None:
