@@ -103,7 +103,9 @@ def test_an_option_that_came_later_had_its_default() -> None:
     assert stored_config.changed_fields(config, stored) == {}
     later = dataclasses.replace(later, normalize_obs=False)
     assert list(stored_config.changed_fields(later, stored)) == ["algorithm.gamma", "normalize_obs"]
-    assert stored_config.changed_fields(config, stored | {"env": "Ant-v5"}) == {"env": ("Ant-v5", "Hopper-v5")}
+    assert stored_config.changed_fields(config, stored | {"env": "Ant-v5"}) == {
+        "env": ("Ant-v5", "Hopper-v5")
+    }
     assert stored_config.changed_fields(config, stored | {"new": 1}) == {"new": (1, "absent")}
     assert "epochs" in stored_config.changed_fields(dataclasses.replace(config, epochs=9), stored)
 
