@@ -75,13 +75,15 @@ def glued(notebook: nbformat.NotebookNode) -> set[str]:
 
 def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
     """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
-    return [
-        f"cell {number}: quotes {name!r}, which no cell{f' of {other}' if other else ''} glues"
-        for number, cell in enumerate(notebook.cells)
-        if cell.cell_type == "markdown"
-        for other, name in QUOTED.findall(cell.source)
-        if name not in glued(nbformat.read(ROOT / "notebooks" / other, 4) if other else notebook)
-    ]
+    known, found = {"": glued(notebook)}, []
+    for number, cell in enumerate(notebook.cells):
+        for other, name in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
+            if other not in known:
+                known[other] = glued(nbformat.read(ROOT / "notebooks" / other, 4))
+            if name not in known[other]:
+                said = f" of {other}" if other else ""
+                found.append(f"cell {number}: quotes {name!r}, which no cell{said} glues")
+    return found
 
 
 def main(arguments: list[str] | None = None) -> int:

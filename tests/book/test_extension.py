@@ -9,16 +9,22 @@ from docutils import nodes
 from docutils.utils import new_document
 from PIL import Image
 
+EXTENSIONS = Path(__file__).parents[2] / "book" / "_ext"
 
-@pytest.fixture(scope="module")
-def extension() -> ModuleType:
-    path = Path(__file__).parents[2] / "book" / "_ext" / "inbounds_book.py"
-    spec = importlib.util.spec_from_file_location("inbounds_book", path)
+
+def load(name: str) -> ModuleType:
+    """An extension of the book: its folder is no package."""
+    spec = importlib.util.spec_from_file_location(name, EXTENSIONS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def extension() -> ModuleType:
+    return load("inbounds_book")
 
 
 @pytest.mark.parametrize(
@@ -52,13 +58,7 @@ def test_only_glued_text_is_touched(extension: ModuleType) -> None:
 
 @pytest.fixture(scope="module")
 def metadata() -> ModuleType:
-    path = Path(__file__).parents[2] / "book" / "_ext" / "metadata.py"
-    spec = importlib.util.spec_from_file_location("metadata", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load("metadata")
 
 
 def test_descriptions_are_cut_behind_a_word(metadata: ModuleType) -> None:
