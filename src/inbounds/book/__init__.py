@@ -1,5 +1,5 @@
 """What the chapters show: figures, videos, explorables and graders.
 
-Everything here needs the ``book`` extra (``pip install ".[book]"`` in the source tree), films alone the lighter
-``video``. Of the rest of the package only :mod:`inbounds.cli` imports it.
+Everything here needs the extra `book` (`pip install ".[book]"` in the source tree). Two parts make do with less: films
+with `video`, the report on the study with `report`. Of the rest of the package only `inbounds.cli` imports it.
 """

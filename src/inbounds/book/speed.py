@@ -25,8 +25,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from inbounds.book.drawing import alt_text
-from inbounds.book.report.html import bullets, paragraph, table
-from inbounds.book.report.html_output import Shown
+from inbounds.book.report.html import Shown, bullets, missing, table
 from inbounds.study.words import percent
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py
@@ -107,7 +106,7 @@ def ratio_table(results: Results | None) -> Shown:
         f"Steps per second, ratios: median (range) of {results['repeats']} interleaved repeats on one core."
     )
     robots = [env.partition("-")[0] for env in measured]
-    return Shown(what, table(caption, ["Who, over whom", *robots], rows))
+    return Shown(what, [table(caption, ["Who, over whom", *robots], rows)])
 
 
 def median_ratio(results: Results, env: str, ours: str, theirs: str) -> float:
@@ -128,7 +127,7 @@ def how_measured(results: Results | None) -> Shown:
     if results is None:
         return _missing(what, AS_ABOVE)
     lines = [line.removeprefix("* ") for line in _benchmarks("report").how(results)]
-    return Shown(what, _code(bullets(lines)))
+    return Shown(what, [_code(bullets(lines))])
 
 
 def show_speed(results: Results | None) -> None:
@@ -167,7 +166,7 @@ def verdict_table(validation: Results | None) -> Shown:
         f"Mean area under the learning curve ± standard deviation over seeds a side ({seeds}), "
         f"{validation['env_steps']:,} env steps each."
     )
-    return Shown(what, table(caption, head, rows, words=(0, 5)))
+    return Shown(what, [table(caption, head, rows, words=(0, 5))])
 
 
 def above_the_start(validation: Results, env: str) -> dict[str, Any]:
@@ -229,14 +228,14 @@ def _read(path: Path) -> Results | None:
 
 
 def _missing(what: str, why: str) -> Shown:
-    return Shown(what, _code(paragraph(why, "missing")))
+    return Shown(what, [_code(missing(why))])
 
 
 def _show_missing(alt: str) -> None:
     """Say on the page that a figure is missing; in the stored notebook it reads like the figure itself."""
     from IPython.display import display
 
-    display({"text/html": paragraph(AS_ABOVE, "missing"), "text/plain": f"Figure: {alt}"}, raw=True)
+    display({"text/html": missing(AS_ABOVE), "text/plain": f"Figure: {alt}"}, raw=True)
 
 
 def _code(html: str) -> str:

@@ -201,7 +201,7 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         from inbounds.book.report.study_report import write_report
     except ImportError as error:
         raise StudyError(
-            f"the report draws with Matplotlib ({error}): pip install '.[book]' in the source tree"
+            f"the report needs Matplotlib and Jinja2 ({error}): pip install '.[report]' in the source tree"
         ) from error
     outcomes = Outcomes.read(command.folder(), cells)
     try:

@@ -1,22 +1,24 @@
 """The chapters' views of the study: the report's own parts, the same stored text with cells and without."""
 
 from collections import Counter
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inbounds.book.report import ledger_table as report_ledger
-from inbounds.book.report import study_pages
-from inbounds.book.report.html_output import Shown
+from inbounds.book.report import ledger_table, study_pages
+from inbounds.book.report.changes import GROUPS
+from inbounds.book.report.html import Shown
 from inbounds.book.report.score_tables import PUBLISHED, THESIS
-from inbounds.book.report.study_report import GROUPS, write_report
-from inbounds.book.report.words import pair_name, spoken, verdict
+from inbounds.book.report.study_report import write_report
+from inbounds.book.report.words import pair_name
 from inbounds.study import analysis, select
 from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
 from inbounds.study.ledger import CLAIMS, claims_named, judge
 from inbounds.study.outcomes import Outcomes
+from inbounds.study.words import spoken, verdict
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
@@ -73,7 +75,7 @@ def test_the_stored_text_does_not_change_when_cells_arrive(nothing: Outcomes, so
 def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path) -> None:
     report = write_report(some, tmp_path / "report.html").read_text(encoding="utf8")
     for view in (study_pages.state(some), study_pages.difference_table(some, "standard", "ppo")):
-        tables = [part for part in view.html.split("\n") if part.startswith('<div class="table"')]
+        tables = [part for part in view.parts if part.startswith('<div class="table"')]
         assert tables
         assert all(table in report for table in tables)
     assert report.count("inbounds study ledger ") == len(CLAIMS)
@@ -81,7 +83,10 @@ def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path)
 
 def cells(view: Shown) -> list[list[str]]:
     return [
-        [cell.partition(">")[2].partition("</td>")[0].replace("<br>", "\n") for cell in row.split("<td")[1:]]
+        [
+            unescape(cell.partition(">")[2].partition("</td>")[0].replace("<br>", "\n"))
+            for cell in row.split("<td")[1:]
+        ]
         for row in view.html.partition("<tbody>")[2].split("<tr>")[1:]
     ]
 
@@ -163,9 +168,9 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
     assert hopper.startswith("Hopper: ")
     assert ant.startswith("Ant: ")
     assert missing == "missing: HalfCheetah, Swimmer, Walker2d, Humanoid"
-    assert report_ledger.counted(found) in study_pages.ledger(found).html
-    assert "1 refuted" in report_ledger.counted(found)
-    assert report_ledger.counted(found[:1]).startswith("1 claim: ")
+    assert ledger_table.counted(found) in study_pages.ledger(found).html
+    assert "1 refuted" in ledger_table.counted(found)
+    assert ledger_table.counted(found[:1]).startswith("1 claim: ")
     assert "Refuted: " in study_pages.decided(found).html
 
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from inbounds.book.report import html
-from inbounds.book.report.aggregates import columns_of
+from inbounds.book.report.arms import columns_of
 from inbounds.book.report.study_report import write_report
-from inbounds.book.report.words import number, p_value, spoken, verdict
 from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, analysis
 from inbounds.study.analysis import Contrast
 from inbounds.study.grid import select
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.statistics import Comparison, Estimate
+from inbounds.study.words import number, p_value, spoken, verdict
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 

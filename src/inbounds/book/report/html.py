@@ -1,44 +1,64 @@
-"""A page of figures and tables in one HTML file that asks nothing of any other: no script, no font, no server."""
+"""Figures and tables in HTML that asks nothing of any other file: no script, no font, no server.
+
+Texts are plain and are escaped on the way (`templates/report.html`); the parts that these functions return are HTML.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
 from inbounds.book.drawing.alt_text import last_picture
+from inbounds.book.templates import macros
 
-_CSS = """
-:root { color-scheme: light; }
-body { font: 17px/1.5 system-ui, sans-serif; color: #22272d; background: #fff; margin: 0 auto; max-width: 82rem;
-  padding: 1rem; }
-h1, h2, h3, p, ul, figure { max-width: 48rem; }
-h1, h2, h3 { line-height: 1.25; }
-h2 { margin-top: 3rem; border-top: 2px solid #5f6770; padding-top: .6rem; }
-a { color: #0b4f9e; }
-figure { margin: 1.5rem 0; }
-figure img { max-width: 100%; height: auto; display: block; }
-figcaption { color: #3d444c; }
-.table { overflow-x: auto; margin: 1.5rem 0; }
-table { border-collapse: collapse; font-size: .82rem; font-variant-numeric: tabular-nums; }
-caption { text-align: left; padding-bottom: .4rem; font-size: .95rem; }
-th, td { padding: .2rem .7rem .2rem 0; text-align: right; vertical-align: top; }
-th { border-bottom: 1.5px solid #5f6770; }
-tbody tr { border-bottom: 1px solid #dfe3e8; }
-th:first-child, td:first-child, .words { text-align: left; }
-th, td { white-space: nowrap; }
-.long { white-space: normal; min-width: 14rem; }
-.missing { color: #5f6770; font-style: italic; }
-nav ul { columns: 2; }
-"""
+KIND = "inbounds-study"
+"""Class by which the book's style sheet knows a view of the study."""
+_HTML = macros("report")
 
 
-_LONG = 50  # characters: a table's cell with more of them may break into lines
+@dataclass(frozen=True)
+class Shown:
+    """What a page shows as HTML, and a stored notebook keeps as a few words that no new measurement changes.
+
+    Example:
+        >>> Shown("a table", [paragraph("5 of 6")])
+        <a table>
+    """
+
+    what: str
+    """In a few words, without numbers."""
+    parts: Sequence[str]
+    """HTML, one below the other."""
+    kind: str = ""
+    """Class of its box, such as `KIND`."""
+
+    @property
+    def html(self) -> str:
+        """All parts."""
+        return "\n".join(self.parts)
+
+    def __repr__(self) -> str:
+        return f"<{self.what}>"
+
+    def _repr_html_(self) -> str:
+        kind = f' class="{self.kind}"' if self.kind else ""
+        return f'<div style="overflow-x:auto"><div{kind}>\n{self.html}\n</div></div>'
+
+
+def of_study(what: str, *parts: str) -> Shown:
+    """Return a view of the study.
+
+    Args:
+        what: in a few words, without numbers.
+        *parts: HTML.
+    """
+    return Shown(f"study: {what}", parts, KIND)
 
 
 def page(title: str, parts: Iterable[str]) -> str:
-    """Return the whole page.
+    """Return a whole page.
 
     Args:
         title: of the page, plain text.
@@ -48,45 +68,32 @@ def page(title: str, parts: Iterable[str]) -> str:
         >>> page("A & B", [paragraph("x < y")]).count("A &amp; B")
         2
     """
-    return "\n".join(
-        [
-            '<!doctype html>\n<html lang="en-GB">\n<head>\n<meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{escape(title)}</title>\n<style>{_CSS}</style>\n</head>\n<body>\n<main>",
-            f"<h1>{escape(title)}</h1>",
-            *parts,
-            "</main>\n</body>\n</html>\n",
-        ]
-    )
+    return f"{_HTML.page(title, parts)}\n"
 
 
 def heading(text: str, level: int = 2, anchor: str = "") -> str:
     """Return a heading, plain text, with an optional anchor."""
-    place = f' id="{anchor}"' if anchor else ""
-    return f"<h{level}{place}>{escape(text)}</h{level}>"
+    return str(_HTML.heading(text, level, anchor))
 
 
 def contents(sections: Iterable[tuple[str, str]]) -> str:
     """Return links to sections, given as (anchor, title)."""
-    links = "".join(f'<li><a href="#{anchor}">{escape(title)}</a></li>' for anchor, title in sections)
-    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+    return str(_HTML.contents(sections))
 
 
-def paragraph(text: str, kind: str = "") -> str:
-    """Return a paragraph of plain text; "missing" sets it back."""
-    look = f' class="{kind}"' if kind else ""
-    return f"<p{look}>{escape(text)}</p>"
+def paragraph(text: str) -> str:
+    """Return a paragraph of plain text."""
+    return str(_HTML.paragraph(text))
+
+
+def missing(text: str) -> str:
+    """Return a paragraph that says what is missing, set back."""
+    return str(_HTML.paragraph(text, "missing"))
 
 
 def bullets(items: Iterable[str]) -> str:
     """Return a list of plain texts."""
-    return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
-
-
-_PART = (
-    "flex:1 1 auto;padding:.1rem .6rem;border:1px solid #5f6770;border-radius:3px;text-align:center;margin:0;"
-    "background:linear-gradient(90deg,rgba(31,130,119,.3) {share:.0%},transparent {share:.0%})"
-)
+    return str(_HTML.bullets(items))
 
 
 def progress(parts: Mapping[str, tuple[int, int]]) -> str:
@@ -96,12 +103,7 @@ def progress(parts: Mapping[str, tuple[int, int]]) -> str:
         >>> "Hopper: 2 of 3" in progress({"Hopper": (2, 3)})
         True
     """
-    told = "".join(
-        f'<li style="{_PART.format(share=done / planned)}">{escape(name)}: {done} of {planned}</li>'
-        for name, (done, planned) in parts.items()
-    )
-    look = "display:flex;flex-wrap:wrap;gap:.3rem;list-style:none;padding:0;margin:1rem 0;max-width:none"
-    return f'<p>Finished:</p><ul style="{look}">{told}</ul>'
+    return str(_HTML.progress(parts))
 
 
 def figure(fig: Figure, alt: str, caption: str = "") -> str:
@@ -111,8 +113,7 @@ def figure(fig: Figure, alt: str, caption: str = "") -> str:
         ValueError: the alt text says less than a sentence would.
     """
     png, width = last_picture(fig, alt)
-    image = f'<img src="data:image/png;base64,{png}" width="{width}" alt="{escape(alt)}">'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+    return str(_HTML.figure(png, width, alt, caption))
 
 
 def table(
@@ -130,23 +131,8 @@ def table(
         >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
         True
     """
+    return str(_HTML.table(caption, head, rows, words))
 
-    def cell(tag: str, place: int, text: str) -> str:
-        looks = {
-            "words": place in words,
-            "missing": text == "missing",
-            "long": max(map(len, text.split("\n"))) > _LONG,
-        }
-        chosen = " ".join(name for name, wanted in looks.items() if wanted)
-        attribute = f' class="{chosen}"' if chosen else ""
-        lines = escape(text).replace("\n", "<br>")
-        return f"<{tag}{attribute}>{lines}</{tag.partition(' ')[0]}>"
 
-    titles = "".join(cell('th scope="col"', i, title) for i, title in enumerate(head))
-    body = "".join(
-        "<tr>" + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>" for row in rows
-    )
-    return (
-        f'<div class="table"><table><caption>{escape(caption)}</caption>'
-        f"<thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>"
-    )
+NONE_FINISHED = missing("missing: none of these cells is finished.")
+"""What stands in place of cells of which none is finished."""

@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.study.ledger import Finding
+from inbounds.book.report.html import Shown
+from inbounds.study.ledger import CLAIMS, Finding, judge
 from inbounds.study.ledger.verdicts import STAYS
+from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics.settings import LEVEL
 from inbounds.study.words import percent
 
@@ -20,7 +22,12 @@ _CAPTION = (
 )
 
 
-def ledger_section(found: Sequence[Finding]) -> list[str]:
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """Return the judgement of every claim of the source thesis."""
+    return [judge(outcomes, claim) for claim in CLAIMS]
+
+
+def ledger(found: Sequence[Finding]) -> Shown:
     """Return the count of verdicts and the table of claims.
 
     Args:
@@ -34,11 +41,12 @@ def ledger_section(found: Sequence[Finding]) -> list[str]:
         ]
         for each in found
     ]
-    return [html.paragraph(counted(found)), html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))]
+    claims = html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))
+    return html.of_study("the ledger", html.paragraph(counted(found)), claims)
 
 
 def counted(found: Sequence[Finding]) -> str:
-    """Say how many claims have which verdict.
+    """Return how many claims have which verdict.
 
     Example:
         >>> counted([])
@@ -51,11 +59,13 @@ def counted(found: Sequence[Finding]) -> str:
     return f"{len(found)} claim{'' if len(found) == 1 else 's'}: {told}{rest}."
 
 
-def decided(found: Sequence[Finding]) -> list[str]:
+def decided(found: Sequence[Finding]) -> Shown:
     """Return the claims that are decided, as a list; a paragraph where none is."""
     told = [
         f"{each.verdict.capitalize()}: {each.claim.says} ({', '.join(each.told.splitlines())})"
         for each in found
         if each.verdict != "undecided"
     ]
-    return [html.bullets(told) if told else html.paragraph("No claim is decided yet.", "missing")]
+    return html.of_study(
+        "what is decided", html.bullets(told) if told else html.missing("No claim is decided yet.")
+    )

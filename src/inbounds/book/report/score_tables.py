@@ -6,16 +6,15 @@ from collections import Counter
 from collections.abc import Mapping
 
 from inbounds.book.report import html
-from inbounds.book.report.aggregates import HEADS
-from inbounds.book.report.arm_sections import title_of
-from inbounds.book.report.words import p_equals, pair_name, spoken, verdict
+from inbounds.book.report.html import Shown
+from inbounds.book.report.words import ARM_NAMES, HEADS, pair_name, title_of
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.statistics import Comparison
 from inbounds.study.statistics.settings import LEVEL
-from inbounds.study.words import percent
+from inbounds.study.words import p_equals, percent, spoken, verdict
 
 THESIS: Mapping[tuple[str, str, str], str] = {
     ("ppo", "logit-normal", "gaussian"): "ahead on 2, little difference on 3, behind on 1",
@@ -28,7 +27,7 @@ THESIS: Mapping[tuple[str, str, str], str] = {
 _WORDS = ("higher", "lower", "not after Holm", "unresolved", "missing")
 
 
-def score_sheet(outcomes: Outcomes) -> list[str]:
+def score_sheet(outcomes: Outcomes) -> Shown:
     """Return on how many robots each difference of mean final returns goes which way, beside what the thesis says."""
     rows: list[list[str]] = []
     waiting: list[str] = []
@@ -41,14 +40,7 @@ def score_sheet(outcomes: Outcomes) -> list[str]:
             continue
         counts = [str(found[word]) for word in _WORDS]
         said = "" if contrast.arm == "beyond" else THESIS[contrast.algorithm, contrast.first, contrast.second]
-        rows.append(
-            [
-                title_of(contrast.arm, contrast.algorithm),
-                pair_name(contrast),
-                *counts,
-                said,
-            ]
-        )
+        rows.append([title_of(contrast.arm, contrast.algorithm), pair_name(contrast), *counts, said])
     caption = (
         f"On how many of {len(ROBOTS)} robots the first family's mean final return is higher or lower "
         f"than the second's after "
@@ -58,11 +50,11 @@ def score_sheet(outcomes: Outcomes) -> list[str]:
     head = ["columns", "difference", *_WORDS, "the source thesis"]
     parts = [html.table(caption, head, rows, (0, 1, 7))] if rows else []
     if waiting:
-        parts.append(html.paragraph(f"missing on all robots: {'; '.join(waiting)}.", "missing"))
-    return parts
+        parts.append(html.missing(f"missing on all robots: {'; '.join(waiting)}."))
+    return html.of_study("wins and losses", *parts)
 
 
-def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
+def found_differences(outcomes: Outcomes, arm: str) -> Shown:
     """Return, robot by robot, every difference of an arm that some endpoint finds, with what the others say of it."""
     tested = {
         contrast: [analysis.differences(outcomes, contrast, endpoint) for endpoint in ENDPOINTS]
@@ -76,15 +68,16 @@ def found_differences(outcomes: Outcomes, arm: str) -> list[str]:
             if any(verdict(each) in ("higher", "lower") for each in comparisons):
                 name = f"{robot}, {contrast.algorithm.upper()}\n{pair_name(contrast)}"
                 rows.append([name, *map(_tested, comparisons)])
+    what = f"what is found, {ARM_NAMES[arm]}"
     if not rows:
-        return [html.paragraph("No difference is found among the finished cells.", "missing")]
+        return html.of_study(what, html.missing("No difference is found among the finished cells."))
     caption = (
         "Differences of means that are found by at least one endpoint: the interval leaves out 0, and so does the "
         f"permutation test after Holm's correction over {len(ROBOTS)} robots, whose p is given. In brackets a "
         f"{percent(LEVEL)} bootstrap interval. Final return and area are primary endpoints, the greedy return is "
         "secondary."
     )
-    return [html.table(caption, ["difference", *HEADS.values()], rows, range(4))]
+    return html.of_study(what, html.table(caption, ["difference", *HEADS.values()], rows, range(4)))
 
 
 def _tested(comparison: Comparison) -> str:
@@ -117,7 +110,7 @@ version 2, which it has read off plots. Both use Gaussian policies. Tianshou's a
 curves: its `analysis.py` takes the maximum over evaluations of the mean over runs, and the standard deviation there."""
 
 
-def published(outcomes: Outcomes) -> list[str]:
+def published(outcomes: Outcomes) -> Shown:
     """Return published scores of Gaussian policies beside the study's, with the metric of each."""
     rows = []
     for algorithm, scores in PUBLISHED.items():
@@ -140,4 +133,4 @@ def published(outcomes: Outcomes) -> list[str]:
         "this study v5, final",
         "this study v5, greedy",
     ]
-    return [html.table(caption, head, rows, (0, 1))]
+    return html.of_study("beside published scores", html.table(caption, head, rows, (0, 1)))

@@ -8,22 +8,18 @@ It works with no cell, with a few and with all of them: what is missing is calle
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
-from inbounds.book.drawing.figures import LOOKS
-from inbounds.book.report import html
-from inbounds.book.report.arm_sections import HEADS, NONE_FINISHED, TITLES, arm_section
-from inbounds.book.report.ledger_table import ledger_section
-from inbounds.book.report.study_figures import interval_panels
-from inbounds.book.report.words import spoken
+from inbounds.book.report import arms, html
+from inbounds.book.report.changes import GROUPS, afterwards, changes
+from inbounds.book.report.html import NONE_FINISHED, Shown
+from inbounds.book.report.ledger_table import findings, ledger
+from inbounds.book.report.over_all_robots import over_all_robots
+from inbounds.book.report.words import ALGORITHMS, ARM_NAMES, ARM_TITLES, title_of
 from inbounds.learning.storage.whole_files import write_whole
-from inbounds.study import analysis
-from inbounds.study.analysis import ENDPOINTS
-from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, STUDY_VERSION, Cell
-from inbounds.study.ledger import CLAIMS, judge
+from inbounds.study.grid import ARMS, ROBOTS, STUDY_VERSION
 from inbounds.study.outcomes import Outcome, Outcomes
-from inbounds.study.statistics import Estimate
 from inbounds.study.statistics.settings import LEVEL, RESAMPLES
 from inbounds.study.words import percent
 
@@ -59,162 +55,98 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
         ...     "Claims" in write_report(nothing, Path(folder) / "report.html").read_text()
         True
     """
-    sections = [
-        ("state", "What there is"),
-        *TITLES.items(),
-        ("afterwards", "Asked afterwards"),
-        ("claims", "Claims of the source thesis"),
-        ("provenance", "Provenance"),
-    ]
-    parts = [
-        html.paragraph(f"Study version {STUDY_VERSION}. {_count(outcomes)}"),
-        html.contents(sections),
-        html.heading("How to read it", 3),
-        html.bullets(HOW_TO_READ),
-        html.heading("What there is", 2, "state"),
-        *state_section(outcomes),
-    ]
-    for arm in TITLES:
-        parts += _mechanisms(outcomes) if arm == "mechanisms" else arm_section(outcomes, arm)
-    parts += [
-        html.heading("Asked afterwards", 2, "afterwards"),
-        html.paragraph(
-            "Cells that the protocol does not have, added when results had been seen: exploratory. "
-            "results/AFTERWARDS.md says why each was added, and what was expected."
-        ),
-        *afterwards(outcomes),
-        html.heading("Claims of the source thesis", 2, "claims"),
-        *ledger_section([judge(outcomes, c) for c in CLAIMS]),
-    ]
-    parts += [html.heading("Provenance", 2, "provenance"), *provenance_section(outcomes)]
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, html.page("In Bounds: the study", parts).encode())
+    write_whole(path, html.page("In Bounds: the study", list(_body(outcomes))).encode())
     return path
 
 
-def _count(outcomes: Outcomes) -> str:
-    return f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
+def _body(outcomes: Outcomes) -> Iterator[str]:
+    """Yield the parts of the page."""
+    sections = {
+        "state": "What there is",
+        **ARM_TITLES,
+        "afterwards": "Asked afterwards",
+        "claims": "Claims of the source thesis",
+        "provenance": "Provenance",
+    }
+
+    def heading(anchor: str) -> str:
+        return html.heading(sections[anchor], 2, anchor)
+
+    finished = f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
+    yield html.paragraph(f"Study version {STUDY_VERSION}. {finished}")
+    yield html.contents(sections.items())
+    yield html.heading("How to read it", 3)
+    yield html.bullets(HOW_TO_READ)
+    yield heading("state")
+    yield from state(outcomes).parts
+    for arm in ARM_TITLES:
+        yield heading(arm)
+        yield from _changed_cells(outcomes) if arm == "mechanisms" else _compared_families(outcomes, arm)
+    yield heading("afterwards")
+    yield html.paragraph(
+        "Cells that the protocol does not have, added when results had been seen: exploratory. "
+        "results/AFTERWARDS.md says why each was added, and what was expected."
+    )
+    yield from afterwards(outcomes).parts
+    yield heading("claims")
+    yield from ledger(findings(outcomes)).parts
+    yield heading("provenance")
+    yield from provenance(outcomes).parts
 
 
-def state_section(outcomes: Outcomes) -> list[str]:
+def _compared_families(outcomes: Outcomes, arm: str) -> Iterator[str]:
+    """Yield the parts of an arm that compares families; short where none of its cells is finished."""
+    finished = [outcomes.finished[cell.id] for cell in ARMS[arm] if cell.id in outcomes.finished]
+    if not finished:
+        yield html.missing("missing: no cell of this arm is finished.")
+        return
+    for algorithm in ALGORITHMS:
+        yield html.heading(title_of(arm, algorithm), 3)
+        if not arms.Part.of(outcomes, arm, algorithm).begun:
+            yield NONE_FINISHED
+            continue
+        for view in (arms.curves, arms.endpoints, arms.difference_table, arms.inside):
+            yield from view(outcomes, arm, algorithm).parts
+    yield html.heading(f"Over all robots, {ARM_NAMES[arm]}", 3)
+    yield from over_all_robots(outcomes, arm).parts
+    if any(outcome.ways for outcome in finished):
+        yield html.heading("Ways to act", 3)
+        yield from arms.ways(outcomes, arm).parts
+
+
+def _changed_cells(outcomes: Outcomes) -> Iterator[str]:
+    """Yield the parts of the arm that changes one thing at a time."""
+    yield html.paragraph(
+        "Each cell differs in one thing from a cell of arm 1 (or 3), with which it is compared: difference of means, "
+        f"with a {percent(LEVEL)} bootstrap interval, robot by robot, without a test and without a claim over robots."
+    )
+    for word, title in GROUPS.items():
+        yield html.heading(title, 3)
+        yield from changes(outcomes, word).parts
+
+
+def state(outcomes: Outcomes) -> Shown:
     """Return which cells are finished."""
     rows = []
     for arm, cells in ARMS.items():
         counts = [Counter(outcomes.states.get(c.id) for c in cells if c.robot == robot) for robot in ROBOTS]
-        rows.append([TITLES[arm], *(f"{c['finished']} of {c.total()}" if c.total() else "–" for c in counts)])
+        rows.append(
+            [ARM_TITLES[arm], *(f"{c['finished']} of {c.total()}" if c.total() else "–" for c in counts)]
+        )
     parts = [html.table("Finished cells of those planned, per robot.", ["arm", *ROBOTS], rows)]
     wrong = [
         f"{name}: {state}" for name, state in outcomes.states.items() if state not in ("finished", "missing")
     ]
     if wrong:
         parts += [html.paragraph("Not used, because they are not what they should be:"), html.bullets(wrong)]
-    return parts
+    return html.of_study("finished cells", *parts)
 
 
-# ---- arm 4
-
-GROUPS = {
-    "matched-noise": "Matched initial noise",
-    "raw-cost": "Cost of raw actions",
-    "entropy": "Entropy bonus",
-    "gamma": "Discount 0.9999",
-    "printed": "The two presets, one factor at a time",
-}
-"""First word of a variant → title."""
-
-
-def _mechanisms(outcomes: Outcomes) -> list[str]:
-    parts = [html.heading(TITLES["mechanisms"], 2, "mechanisms")]
-    said = (
-        "Each cell differs in one thing from a cell of arm 1 (or 3), with which it is compared: difference of means, "
-        f"with a {percent(LEVEL)} bootstrap interval, robot by robot, without a test and without a claim over robots."
-    )
-    parts.append(html.paragraph(said))
-    for word, title in GROUPS.items():
-        parts += [html.heading(title, 3), *changes(outcomes, word)]
-    return parts
-
-
-def changes(outcomes: Outcomes, word: str) -> list[str]:
-    """Return what one group of the fourth arm's variants changes, as a figure and a table.
-
-    Args:
-        outcomes: what there is of the study.
-        word: a key of `GROUPS`.
-    """
-    cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
-    if not any(cell.id in outcomes.finished for cell in cells):
-        return [NONE_FINISHED]
-    return _changes(outcomes, GROUPS[word], cells)
-
-
-def afterwards(outcomes: Outcomes) -> list[str]:
-    """Return what the cells of `AFTERWARDS` change against those of arm 1, as a figure and a table."""
-    both = outcomes.and_of(AFTERWARDS)
-    if not any(cell.id in both.finished for cell in AFTERWARDS):
-        return [NONE_FINISHED]
-    return _changes(both, "Initial noise, asked afterwards", AFTERWARDS)
-
-
-def _changes(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
-    panels: dict[str, dict[str, Estimate | None]] = {}
-    names, rows = [], []
-    for cell in cells:
-        outcome = outcomes.finished.get(cell.id)
-        found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
-        panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
-        if found["final"] is not None:
-            names.append((cell.robot, cell.algorithm.upper(), LOOKS[cell.family].label, cell.variant))
-            rows.append([spoken(estimate) for estimate in found.values()])
-    if not rows:
-        return [NONE_FINISHED]
-    counts = {panel: (sum(map(bool, row.values())), len(row)) for panel, row in panels.items()}
-    drawn = {family for row in panels.values() for family, estimate in row.items() if estimate}
-    panels = {
-        panel: {family: estimate for family, estimate in row.items() if family in drawn}
-        for panel, row in panels.items()
-        if any(row.values())
-    }
-    fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
-    alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
-        f"{panel}: " + ", ".join(f"{LOOKS[f].label} {spoken(e)}" for f, e in row.items())
-        for panel, row in panels.items()
-    )
-    # What all rows share is said once, in the caption: the table is wide enough.
-    columns = dict(zip(("robot", "algorithm", "family", "variant"), zip(*names, strict=True), strict=True))
-    told = {name: column for name, column in columns.items() if len(set(column)) > 1 or len(rows) == 1}
-    shared = [column[0] for name, column in columns.items() if name not in told]
-    where = f"{title} ({', '.join(shared)})" if shared else title
-    caption = f"{where}: changed cell minus cell of comparison."
-    table = [[*name, *row] for name, row in zip(zip(*told.values(), strict=True), rows, strict=True)]
-    head = [*told, *HEADS.values()]
-    parts = [html.figure(fig, alt, ""), html.table(caption, head, table, range(len(told)))]
-    if any(done < planned for done, planned in counts.values()):
-        parts.append(html.progress(_without_shared(counts)))
-    return parts
-
-
-def _without_shared(counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
-    """Name panels in one line, by what does not hold for all of them."""
-    names = [panel.replace("\n", ", ").split(", ") for panel in counts]
-    told = [i for i, part in enumerate(zip(*names, strict=True)) if len(set(part)) > 1] or [0]
-    return {
-        ", ".join(name[i] for i in told): count for name, count in zip(names, counts.values(), strict=True)
-    }
-
-
-def _panel(cell: Cell) -> str:
-    """What a panel is called: all that tells the group's cells apart but the family."""
-    return f"{cell.robot}, {cell.algorithm.upper()}\n{cell.variant}"
-
-
-# ---- provenance
-
-
-def provenance_section(outcomes: Outcomes) -> list[str]:
+def provenance(outcomes: Outcomes) -> Shown:
     """Return what the finished cells ran on, and what they cost."""
     if not outcomes.finished:
-        return [html.paragraph("missing: no cell is finished.", "missing")]
+        return html.of_study("provenance", html.missing("missing: no cell is finished."))
     parts = Counter(_ran_on(part) for o in outcomes.finished.values() for part in o.metadata["sessions"])
     # Versions and processor are long, and few: each pair has a number, which a list below the table explains.
     used = Counter(ran[2:] for ran in parts.elements())
@@ -226,7 +158,8 @@ def provenance_section(outcomes: Outcomes) -> list[str]:
     )
     where = html.bullets(f"{number}: {'; '.join(pair)}" for pair, number in place.items())
     cost = html.paragraph(_cost(list(outcomes.finished.values())))
-    return [html.table(caption, ["parts", "commit", "engine", "machine"], rows, (1, 2, 3)), where, cost]
+    told = html.table(caption, ["parts", "commit", "engine", "machine"], rows, (1, 2, 3))
+    return html.of_study("provenance", told, where, cost)
 
 
 def _ran_on(part: dict[str, object]) -> tuple[str, str, str, str]:

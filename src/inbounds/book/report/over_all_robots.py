@@ -1,4 +1,4 @@
-"""The part of the study's report on all robots at once, and what an arm's columns are."""
+"""An arm over all robots: IQM of normalised scores, probability of improvement, performance profiles."""
 
 from __future__ import annotations
 
@@ -8,36 +8,29 @@ import numpy as np
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
+from inbounds.book.report.arms import columns_of
+from inbounds.book.report.html import Shown
 from inbounds.book.report.study_figures import interval_panels, performance_profiles
-from inbounds.book.report.words import in_words, pair_name, spoken
+from inbounds.book.report.words import ALGORITHMS, ARM_NAMES, HEADS, in_words, pair_name
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, REFERENCE
-from inbounds.study.grid import ARMS, ROBOTS
+from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
-from inbounds.study.words import percent
+from inbounds.study.words import percent, spoken
 
-ALGORITHMS = ("ppo", "trpo")
-HEADS: Mapping[str, str] = {"final": "final return", "area": "area", "greedy": "greedy return"}
-"""Endpoint → title of its column."""
 NORMALIZED = "0: return of the first epoch, 1: final return, of PPO × Gaussian in arm 1"
 
 
-def columns_of(arm: str, algorithm: str) -> dict[str, Column]:
-    """Return by family, in the book's order, the columns that an arm compares; arm 3's stand beside arm 1's."""
-    arms = ("standard", "beyond") if arm == "beyond" else (arm,)
-    planned = {cell.family for a in arms for cell in ARMS[a] if cell.algorithm == algorithm}
-    return {family: Column.within(arm, algorithm, family) for family in LOOKS if family in planned}
-
-
-def aggregates(outcomes: Outcomes, arm: str, title: str) -> list[str]:
-    """Return IQM, probability of improvement and profiles of an arm, as parts of a page; short where incomplete."""
-    parts = [html.heading(f"Over all robots, {title}", 3)]
+def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
+    """Return IQM, probability of improvement and profiles of an arm; short where incomplete."""
+    title = ARM_NAMES[arm]
     columns = {algorithm: columns_of(arm, algorithm) for algorithm in ALGORITHMS}
     own = [column for row in columns.values() for column in row.values() if column.arm == arm]
     if not any(analysis.normalized(outcomes, column, "final") for column in own):
         lacking = [r for r in ROBOTS if any(outcomes.find(c, r) is None for c in (REFERENCE, *own))]
         said = f"missing ({title}): aggregates need all six robots; not complete yet: {', '.join(lacking)}."
-        return [*parts, html.paragraph(said, "missing")]
+        return html.of_study(f"over all robots, {title}", html.missing(said))
+    parts = []
     references = analysis.references(outcomes)
     if flat := [robot for robot, (zero, one) in references.items() if one <= zero]:
         parts.append(html.paragraph(f"Left out, their references not being in order: {', '.join(flat)}."))
@@ -50,7 +43,8 @@ def aggregates(outcomes: Outcomes, arm: str, title: str) -> list[str]:
         fig = interval_panels(found, xlabel=f"normalised {name}")
         parts.append(html.figure(fig, alt, f"IQM of all runs, normalised per robot ({NORMALIZED})."))
     parts += [_improvement(outcomes, arm, title), *_without_diverged(outcomes, arm, title, columns)]
-    return parts + [_profiles(outcomes, f"{a.upper()}, {title}", columns[a]) for a in ALGORITHMS]
+    parts += [_profiles(outcomes, f"{a.upper()}, {title}", columns[a]) for a in ALGORITHMS]
+    return html.of_study(f"over all robots, {title}", *parts)
 
 
 def _improvement(outcomes: Outcomes, arm: str, title: str, *, without_diverged: bool = False) -> str:
