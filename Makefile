@@ -27,7 +27,7 @@ quick: setup  ## format, lint, types and the fast tests  (two minutes; while you
 test: setup  ## pytest on the package and the book, nbval on the notebooks
 	@$(PY) tools/run_tests.py
 
-check: setup  ## format, lint, types, doctests, stored notebooks
+check: setup  ## format, lint, types, doctests, stored notebooks, budgets
 	@$(PY) tools/run_checks.py
 
 format: setup  ## let ruff format the code, and strip pictures from the stored notebooks

@@ -1,6 +1,6 @@
-"""`make check`: format, lint, types, doctests, stored notebooks. Runs them all, then says which failed.
+"""`make check`: format, lint, types, doctests, stored notebooks, budgets. Runs them all, then says which failed.
 
-python tools/run_checks.py                   all five, two at a time
+python tools/run_checks.py                   all six, two at a time
 python tools/run_checks.py format lint       some
 """
 
@@ -17,6 +17,7 @@ CHECKS = {
     "types": ["mypy"],
     "doctests": ["pytest", "-q", "-p", "tests.temporary", "--doctest-modules", "src/inbounds", "benchmarks"],
     "notebooks": ["tools/notebook_hook.py", "--check"],
+    "budgets": ["tools/count_pages.py"],
 }
 
 

@@ -18,7 +18,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import nbformat
-import yaml
+
+from inbounds.book.pages.contents import contents
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER = ".handed-out.json"
@@ -87,15 +88,18 @@ def written(path: Path) -> str:
 
 
 def chapters_in_order(toc: Path = ROOT / "_toc.yml") -> dict[str, Path]:
-    """The chapters as a class reads them: ``01_actions_have_bounds.ipynb`` and so on, and the book's notebook of each.
+    """The notebooks as a class reads them, and the book's notebook of each.
+
+    Core chapters are numbered, ``01_actions_have_bounds.ipynb`` and so on; the pages of *Going deeper* follow them as
+    ``deeper_NAME.ipynb``.
 
     Args:
         toc: the book's table of contents, at its root. A file has no number of its own there: chapters move.
     """
-    parts = yaml.safe_load(toc.read_text(encoding="utf8"))["parts"]
-    files = [chapter["file"] for part in parts if part.get("numbered") for chapter in part["chapters"]]
-    notebooks = [toc.parent / f"{file}.ipynb" for file in files]
-    return {f"{number:02}_{notebook.name}": notebook for number, notebook in enumerate(notebooks, 1)}
+    pages, folder = contents(toc), toc.parent / "notebooks"
+    copies = {f"{number:02}_{name}.ipynb": name for number, name in enumerate(pages.core, 1)}
+    copies |= {f"deeper_{name}.ipynb": name for name in pages.depth}
+    return {copied: folder / f"{name}.ipynb" for copied, name in copies.items()}
 
 
 def hand_out(chapters: Mapping[str, Path], folder: Path) -> dict[str, str]:

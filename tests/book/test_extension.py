@@ -1,6 +1,7 @@
 """The book's Sphinx extension sets glued numbers as the prose sets typed ones."""
 
 import importlib.util
+import json
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -93,3 +94,25 @@ def test_the_picture_is_as_its_tags_say(metadata: ModuleType) -> None:
     with Image.open(path) as picture:
         assert picture.size == metadata.PICTURE_SIZE
         assert picture.format == "PNG"
+
+
+@pytest.mark.parametrize(
+    ("page", "label"),
+    [("notebooks/core_one", "Core chapter"), ("notebooks/deep_one", "Going deeper"), ("book/api", "")],
+)
+def test_a_page_says_its_kind_and_its_minutes(tmp_path: Path, page: str, label: str) -> None:
+    (tmp_path / "_toc.yml").write_text(
+        "root: a\nparts:\n  - {numbered: 2, chapters: [{file: notebooks/core_one}]}\n"
+        "  - {caption: Going deeper, chapters: [{file: notebooks/deep_one}]}\n"
+    )
+    (tmp_path / "notebooks").mkdir()
+    for name in ("core_one", "deep_one"):
+        cells = [{"cell_type": "markdown", "source": ["word " * 300], "metadata": {}}]
+        (tmp_path / "notebooks" / f"{name}.ipynb").write_text(json.dumps({"cells": cells}))
+    context = {"body": "<h1>A <i>title</i></h1><p>Text.</p><h1>Another</h1>"}
+    load("kinds").say_kind(SimpleNamespace(srcdir=tmp_path), page, "page.html", context, None)
+    assert context["body"].count("page-kind-") == bool(label)
+    if label:
+        assert "</h1>\n<p class" in context["body"]
+        assert label in context["body"]
+        assert "about 2 minutes of reading" in context["body"]

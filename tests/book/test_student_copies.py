@@ -173,9 +173,11 @@ def test_chapters_are_numbered_as_the_book_orders_them(tmp_path: Path) -> None:
         "  - chapters: [{file: book/preface}]\n"
         "  - numbered: 2\n    chapters: [{file: notebooks/b}, {file: notebooks/a}]\n"
         "  - numbered: 2\n    chapters: [{file: notebooks/c}]\n"
+        "  - caption: Going deeper\n    chapters: [{file: notebooks/e}, {file: notebooks/d}]\n"
+        "  - caption: Reference\n    chapters: [{file: book/api}]\n"
     )
     found = tool.chapters_in_order(toc)
-    assert list(found) == ["01_b.ipynb", "02_a.ipynb", "03_c.ipynb"]
+    assert list(found) == ["01_b.ipynb", "02_a.ipynb", "03_c.ipynb", "deeper_e.ipynb", "deeper_d.ipynb"]
     assert found["02_a.ipynb"] == tmp_path / "notebooks" / "a.ipynb"
     assert all(path.is_file() for path in tool.chapters_in_order().values())
 

@@ -1,4 +1,8 @@
-"""Numbers of the study in words: estimates with their intervals, p-values, what a comparison shows."""
+"""Numbers of the study in words: estimates with their intervals, p-values, what a comparison shows.
+
+`verdict` is the table's word for a comparison after Holm; a page's words for any interval are in
+`inbounds.book.verdicts`. Both ask `side`.
+"""
 
 from __future__ import annotations
 
@@ -54,6 +58,16 @@ def p_equals(p: float) -> str:
     return f"p {value}" if value.startswith("<") else f"p = {value}" if value else ""
 
 
+def side(low: float | np.ndarray, high: float | np.ndarray, against: float = 0.0) -> int:
+    """Say on which side of a number an interval lies: 1 above, −1 below, 0 if it holds the number.
+
+    Example:
+        >>> side(0.1, 0.3), side(-3, -1), side(0.0, 2.0)
+        (1, -1, 0)
+    """
+    return int(float(low) > against) - int(float(high) < against)
+
+
 def verdict(comparison: Comparison, level: float = 1 - LEVEL) -> str:
     """Say in a word what a comparison shows.
 
@@ -64,10 +78,11 @@ def verdict(comparison: Comparison, level: float = 1 - LEVEL) -> str:
     gap = comparison.difference
     if gap is None:
         return ""
-    if gap.low <= 0 <= gap.high:
+    found = side(gap.low, gap.high)
+    if not found:
         return "unresolved"
     if comparison.p_adjusted < level:
-        return "higher" if gap.value > 0 else "lower"
+        return "higher" if found > 0 else "lower"
     return "not after Holm"
 
 
