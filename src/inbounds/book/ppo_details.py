@@ -12,13 +12,13 @@ stays a faithful record while the study goes on.
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.templates import macros
 from inbounds.study import StudyFolder, analysis
 from inbounds.study.grid import ARMS
 from inbounds.study.outcomes import Column, Outcomes
@@ -56,25 +56,10 @@ class CostTable:
         return f"<table: {len(self.rows)} rows of detail and robot, {len(self.families)} families>"
 
     def _repr_html_(self) -> str:
+        html = macros("details")
         if all(cell in (NOT_RUN, NOT_PLANNED) for cells in self.rows.values() for cell in cells):
-            details = dict.fromkeys(html.escape(detail) for detail, _ in self.rows)
-            return f"<p>Not yet run, on any robot: the study's cells for {', '.join(details)}.</p>"
-        heads = "".join(f"<th scope='col'>{LOOKS[family].label}</th>" for family in self.families)
-        body = "".join(
-            f"<tr><th scope='row'>{html.escape(detail)}</th><td>{robot}</td>"
-            + "".join(f"<td>{cell}</td>" for cell in cells)
-            + "</tr>"
-            for (detail, robot), cells in self.rows.items()
-        )
-        caption = (
-            "Change of the mean final return over ten seeds when one detail of <code>common</code> is changed, "
-            "with a 95 % bootstrap interval"
-        )
-        return (
-            f'<div style="overflow-x:auto"><table class="table"><caption>{caption}</caption><thead><tr>'
-            f"<th scope='col'>changed</th><th scope='col'>robot</th>{heads}</tr></thead>"
-            f"<tbody>{body}</tbody></table></div>"
-        )
+            return str(html.not_run(dict.fromkeys(detail for detail, _ in self.rows)))
+        return str(html.table([LOOKS[family].label for family in self.families], self.rows))
 
 
 def what_details_cost(results: str | Path | Outcomes) -> CostTable:

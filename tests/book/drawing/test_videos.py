@@ -80,7 +80,7 @@ def test_the_page_shows_it_quietly():
         assert "width" not in video, "a fixed width would overflow a phone"
         assert "max-width" not in video["style"]
     assert tags["video"][1]["aria-label"].endswith('σ < 1 & "more"')
-    assert "σ &lt; 1 &amp; &quot;more&quot;</figcaption>" in text
+    assert "σ &lt; 1 &amp; &#34;more&#34;</figcaption>" in text
     assert "flex-wrap:wrap" in tags["div"][0]["style"]
     assert "color" not in text.split("base64")[0]  # theme-neutral
     assert not re.search(r"https?://", text)

@@ -11,7 +11,6 @@ them. Films that are shown together open with the moment in which they differ mo
 from __future__ import annotations
 
 import base64
-import html
 import itertools
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inbounds.book.templates import macros
 from inbounds.learning.storage.whole_files import write_whole
 
 if TYPE_CHECKING:  # what encodes a film needs no MuJoCo
@@ -37,8 +37,6 @@ _FILE_QUANTISER = 22  # for files, which are watched larger
 _FFMPEG_ARGS = ("-bf", "0", "-movflags", "+faststart", "-map_metadata", "-1", "-fflags", "+bitexact")
 
 _BAND = 60  # pixels below the picture: Chromium's controls take 56, Firefox's 40
-# Chromium darkens what is behind its controls, and some way above them; the band is dark as it is.
-_STYLE = "<style>.inbounds-videos video::-webkit-media-controls-panel{background-image:none}</style>"
 
 
 @dataclass(frozen=True)
@@ -64,21 +62,10 @@ class Video:
     seconds: float
 
     def to_html(self) -> str:
-        """A figure with the video and its caption."""
-        title = html.escape(self.title, quote=True)
-        label = f"Video, {self.seconds:.1f} seconds: {title}"
-        # The picture is as wide as the figure; a browser without container units scales the band with it.
-        picture = f"{100 * self.height / self.width:.4g}cqw"
-        return (
-            f'<figure style="margin:0;flex:1 1 14rem;min-width:0;max-width:{self.width}px;container-type:inline-size">'
-            f'<video controls muted playsinline preload="metadata" aria-label="{label}" '
-            f'poster="data:image/jpeg;base64,{_base64(self.poster)}" '
-            f'style="display:block;width:100%;aspect-ratio:{self.width}/{self.height + _BAND};height:auto;'
-            f'height:calc({picture} + {_BAND}px);object-fit:contain;object-position:top;background:#22272D">'
-            f'<source type="video/mp4" src="data:video/mp4;base64,{_base64(self.mp4)}">'
-            f"{label} (this browser cannot play it)</video>"
-            f'<figcaption style="text-align:center;margin-top:0.25rem">{title}</figcaption></figure>'
-        )
+        """Return a figure with the video and its caption."""
+        pictures = _base64(self.poster), _base64(self.mp4)
+        size = self.width, self.height, _BAND
+        return str(macros("videos").video(self.title, self.seconds, *size, *pictures))
 
 
 class VideoRow:
@@ -101,11 +88,7 @@ class VideoRow:
         return f"<{count}: {', '.join(repr(video.title) for video in self.videos)}>"
 
     def _repr_html_(self) -> str:
-        figures = "".join(video.to_html() for video in self.videos)
-        return (
-            '<div class="inbounds-videos" style="display:flex;flex-wrap:wrap;gap:1rem;justify-content:center">'
-            f"{_STYLE}{figures}</div>"
-        )
+        return str(macros("videos").row([video.to_html() for video in self.videos]))
 
 
 def show_films(films: Mapping[str, Film]) -> VideoRow:

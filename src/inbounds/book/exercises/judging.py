@@ -6,13 +6,14 @@ that has not been answered (its function still returns ``...``) is not a failure
 The references here are written differently from the chapters' solutions, so that a slip in one is not a slip in both.
 """
 
-import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
+
+from inbounds.book.templates import macros
 
 
 @dataclass(frozen=True)
@@ -29,17 +30,17 @@ class Judgement:
     message: str
     """One sentence: what was checked, or what is wrong."""
 
+    @property
+    def mark(self) -> str:
+        """How it went, in two words."""
+        return {True: "✓ passed", False: "✗ not yet", None: "… not answered"}[self.passed]
+
     def __repr__(self) -> str:
-        mark = {True: "✓ passed", False: "✗ not yet", None: "… not answered"}[self.passed]
-        return f"{mark}: {self.exercise}: {self.message}"
+        return f"{self.mark}: {self.exercise}: {self.message}"
 
     def _repr_html_(self) -> str:
         kind = {True: "tip", False: "warning", None: "note"}[self.passed]
-        title, _, text = repr(self).partition(": ")
-        return (
-            f'<div class="admonition {kind}"><p class="admonition-title">{title}</p>'
-            f"<p><code>{html.escape(self.exercise)}</code>: {html.escape(text.partition(': ')[2])}</p></div>"
-        )
+        return str(macros("judgement").box(kind, self.mark, self.exercise, self.message))
 
 
 @dataclass(frozen=True)
