@@ -6,11 +6,13 @@ rewards of the first steps are compared (`inbounds.study.verify`), and the engin
 
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from inbounds.study import StudyFolder, all_cells
 from inbounds.study.grid import STUDY_VERSION
 from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
+from inbounds.study.store import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 RESULTS = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
@@ -33,6 +35,16 @@ def test_files_have_their_checksums_and_are_of_this_study() -> None:
 def test_no_foreign_cell_is_shipped() -> None:
     planned = {cell.id for cell in CELLS}
     assert {path.stem for path in (RESULTS.results / "cells").glob("*.parquet")} <= planned
+
+
+def test_every_column_means_what_the_table_of_columns_says() -> None:
+    for path in (RESULTS.results / "cells").glob("*.parquet"):
+        for field in pq.read_schema(path):
+            kind, meaning = COLUMNS[field.name]
+            assert (field.type, field.metadata) == (kind, {b"meaning": meaning.encode()}), (
+                path.name,
+                field.name,
+            )
 
 
 @pytest.mark.slow

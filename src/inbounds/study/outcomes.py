@@ -19,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from inbounds.learning.storage.whole_files import damaged
 from inbounds.study import store
 from inbounds.study.grid import ARMS, Cell, study_cells
 from inbounds.study.running import file_checks
@@ -174,7 +175,7 @@ def _by_way(episodes: pa.Table, column: str, seeds: int) -> dict[str, Floats]:
 def _whole(path: Path, look: Callable[[Cell, pa.Table], str], cell: Cell) -> pa.Table:
     table = store.read_cell(path)
     if said := look(cell, table):
-        raise store.damaged(path, said)
+        raise damaged(path, said, store.restore(path))
     return table
 
 
@@ -221,7 +222,10 @@ class Outcomes:
         return cls(finished, states, folder)
 
     def and_of(self, cells: Sequence[Cell]) -> Outcomes:
-        """Return these and what there is of more cells, from the same folder.
+        """Return the outcomes of these and of more cells, read from the same folder.
+
+        Args:
+            cells: the others, finished or not.
 
         Example:
             >>> from pathlib import Path

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
 from inbounds.learning.storage.run_metadata import METADATA_KEY, metadata_of
+from inbounds.learning.storage.run_store import COLUMNS as OF_A_RUN
 from inbounds.learning.storage.stored_config import changed_fields
-from inbounds.learning.storage.whole_files import DamagedFileError, file_lock, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, damaged, file_lock, write_whole
 from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
@@ -34,9 +35,9 @@ CHECKSUMS_FILE = "checksums.txt"
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
 EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
-    "epoch": (pa.int32(), "0, 1, …: rollouts, each followed by one update"),
+    "epoch": OF_A_RUN["epoch"],
     "seed": (pa.int32(), "the seed"),
-    "env_steps": (pa.int64(), "steps of this seed's environment up to the end of the epoch"),
+    "env_steps": OF_A_RUN["env_steps"],
     "seconds": (pa.float64(), "wall time of the epoch, all seeds together, without evaluation [s]"),
     "episodes": (pa.int32(), "episodes that ended within the epoch; 0 once the seed has diverged"),
     "return_mean": (
@@ -45,6 +46,17 @@ EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
     ),
     "diverged": (pa.bool_(), "the seed's weights are not finite"),
 }
+_DIAGNOSTICS = (
+    "entropy",
+    "kl",
+    "approx_kl",
+    "clip_fraction",
+    "accepted",
+    "step_fraction",
+    "explained_variance",
+    "action_std",
+    "saturation",
+)
 _NOISE = "of the policy that drew the epoch's rollout, over its states and the action's dimensions"
 MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
     "greedy_return": (
@@ -52,15 +64,7 @@ MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
         "undiscounted return of one episode without noise, acting by the median",
     ),
     "evaluation_seconds": (pa.float64(), "wall time of that evaluation, all seeds together [s]"),
-    "entropy": (pa.float32(), "mean entropy after the update, the one of the family's bonus [nats]"),
-    "kl": (pa.float32(), "mean exact KL(old‖new) of the update [nats]"),
-    "approx_kl": (pa.float32(), "its estimate from the drawn latents [nats]"),
-    "clip_fraction": (pa.float32(), "PPO: fraction of steps whose ratio ended beyond 1 ± ε"),
-    "accepted": (pa.float32(), "TRPO: 1 where the line search accepted a step, else 0"),
-    "step_fraction": (pa.float32(), "TRPO: accepted length, as a fraction of the full step"),
-    "explained_variance": (pa.float32(), "of the returns by the values before the update"),
-    "action_std": (pa.float32(), "standard deviation of the executed actions, in units of half the range"),
-    "saturation": (pa.float32(), "fraction of executed action components within 0.1 % of a bound"),
+    **{name: (pa.float32(), OF_A_RUN[name][1]) for name in _DIAGNOSTICS},
     **{f"abs_loc_q{q:02}": (pa.float32(), f"{q} % quantile of |μ|, {_NOISE}") for q in (50, 90, 99)},
     **{f"scale_q{q:02}": (pa.float32(), f"{q} % quantile of σ, {_NOISE}") for q in (1, 50, 99)},
     "at_log_std_min": (pa.float32(), f"fraction of log σ at the lower clip, {_NOISE}"),
@@ -71,8 +75,8 @@ MEASURED: Mapping[str, tuple[pa.DataType, str]] = {
     "at_beta_max": (pa.float32(), f"fraction of β at the cap, {_NOISE}"),
 }
 COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {**EVERY_EPOCH, **MEASURED}
-"""Column → type and meaning. Those of `MEASURED` are null but for the first and every tenth epoch; a file
-has those of its algorithm and family."""
+"""Column → type and meaning, which for what every run records is that of `run_store.COLUMNS`. Those of `MEASURED` are
+null but for the first and every tenth epoch; a file has those of its algorithm and family."""
 
 _WITHOUT_POLICY = {"episodes": 0, "return_mean": np.nan}
 TIMINGS = ("seconds", "evaluation_seconds")
@@ -253,7 +257,7 @@ def read_cell(path: str | Path) -> pa.Table:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError) as error:
-        raise damaged(Path(path), error) from error
+        raise damaged(Path(path), error, restore(path)) from error
 
 
 def read_metadata(path: str | Path) -> dict[str, Any]:
@@ -268,19 +272,13 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-        raise damaged(Path(path), error) from error
+        raise damaged(Path(path), error, restore(path)) from error
     if not {"config", "study_version", "id"} <= found.keys():
-        raise damaged(Path(path), "it is no cell of a study")
+        raise damaged(Path(path), "it is no cell of a study", restore(path))
     return found
 
 
-def damaged(path: Path, reason: object) -> DamagedFileError:
-    """Return the error that says what is wrong with a result and what to do."""
-    said = (str(reason) or type(reason).__name__).splitlines()[0]
-    return DamagedFileError(f"{path} is damaged ({said[:120]}): {restore(path)}")
-
-
-def restore(path: Path) -> str:
+def restore(path: str | Path) -> str:
     """Return what to do about a damaged result."""
     return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and run the cell again"
 

@@ -43,10 +43,7 @@ COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {
     "action_std": (pa.float64(), "standard deviation of the executed actions, in units of half the range"),
     "kl": (pa.float64(), "mean exact KL(old‖new) of the update [nats]"),
     "approx_kl": (pa.float64(), "its estimate from the drawn latents [nats]"),
-    "entropy": (
-        pa.float64(),
-        "mean entropy of the policy after the update, the one of the family's bonus [nats]",
-    ),
+    "entropy": (pa.float64(), "mean entropy after the update, the one of the family's bonus [nats]"),
     "explained_variance": (pa.float64(), "of the returns by the values before the update"),
     "clip_fraction": (pa.float64(), "PPO: fraction of steps whose ratio ended beyond 1 ± ε"),
     "accepted": (pa.float64(), "TRPO: 1 where the line search accepted a step, else 0"),
