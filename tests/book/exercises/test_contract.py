@@ -20,6 +20,8 @@ from tests.book.exercises import (
     test_greedy_action,
     test_kl_invariance,
     test_logit_normal_density,
+    test_logit_normal_moments,
+    test_tanh_gaussian,
     test_trpo,
 )
 
@@ -35,9 +37,13 @@ RIGHT = [
     for chapter, answers in {
         "actions_have_bounds": test_actions_have_bounds.RIGHT,
         "beta_policies": test_beta_policies.RIGHT,
+        "clipped_divergence": test_clipped_divergence.RIGHT,
+        "f_divergences": test_f_divergences.RIGHT,
         "greedy_action": test_greedy_action.RIGHT,
         "kl_invariance": test_kl_invariance.RIGHT,
         "logit_normal_density": test_logit_normal_density.RIGHT,
+        "logit_normal_moments": test_logit_normal_moments.RIGHT,
+        "tanh_gaussian": test_tanh_gaussian.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
     }.items()
     for name, right in answers.items()

@@ -1,0 +1,58 @@
+"""Graders of the page *Every divergence, and every map* (`judging` tells how one works)."""
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases
+
+__all__ = ["binned_kl"]
+
+
+def binned_kl(function: Callable[..., Any]) -> Judgement:
+    """Judge the KL divergence of two Gaussians seen through bins."""
+
+    def case(
+        loc: float, scale: float, loc_new: float, scale_new: float, edges: list[float], hint: str = ""
+    ) -> Case:
+        old, new = _probabilities(loc, scale, edges), _probabilities(loc_new, scale_new, edges)
+        inner = [np.array(x[1:-1]) / float(sum(x[1:-1])) for x in (old, new)]
+        full = np.log(scale_new / scale) + (scale**2 + (loc - loc_new) ** 2) / (2 * scale_new**2) - 0.5
+        mistakes = {
+            "that is the Gaussians' divergence: sum over the bins instead": full,
+            "that is new to old: the first argument draws, the second is compared": _kl(new, old),
+            "the first and the last bin are missing": _kl(old[1:-1], new[1:-1]),
+            "the bins at both ends are missing, and the others made to sum to one": _kl(inner[0], inner[1]),
+            "the sign is wrong: a divergence is not negative": -_kl(old, new),
+            "divide by log 2 for bits; the book's divergences are in nats": _kl(old, new) / np.log(2),
+        }
+        known = {"hint": hint} if hint else {}
+        return Case((loc, scale, loc_new, scale_new, np.array(edges)), _kl(old, new), mistakes, **known)
+
+    cases = [
+        case(0.0, 1.0, 0.8, 0.7, [-1.0, 0.0, 1.0]),
+        case(-0.3, 2.5, 0.3, 2.0, [-1.0, -0.5, 0.2, 1.0]),
+        case(
+            9.5,
+            1.0,
+            0.0,
+            1.0,
+            [-1.0, 0.0, 9.0],
+            hint="under the new law the last bin has probability 10⁻¹⁹: 1 − Φ(9) is 0 in floating point, Φ(−9) is not",
+        ),
+    ]
+    return judge_cases(function, cases, "right, and in the far tail too")
+
+
+def _probabilities(loc: float, scale: float, edges: list[float]) -> list[float]:
+    """The probabilities of the bins, in fifty digits."""
+    with mpmath.workdps(50):
+        below = [mpmath.ncdf((mpmath.mpf(edge) - loc) / scale) for edge in edges]
+        return [float(b - a) for a, b in zip([mpmath.mpf(0), *below], [*below, mpmath.mpf(1)], strict=True)]
+
+
+def _kl(p: Any, q: Any) -> float:
+    p, q = np.asarray(p), np.asarray(q)
+    return float(np.sum(p * np.log(p / q)))
