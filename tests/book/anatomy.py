@@ -80,7 +80,7 @@ def shows_before_stating(cells: list[nbformat.NotebookNode]) -> bool:
     """Whether something is shown before the first definition, statement or check."""
     explorables: set[str] = set()
     for cell in cells:
-        if cell.cell_type == "markdown" and re.search(r"\{prf:|\*\*Check it", cell.source):
+        if cell.cell_type == "markdown" and re.search(r"\{prf:(?!ref\})|\*\*Check it", cell.source):
             return False
         if cell.cell_type == "code":
             for names in re.findall(

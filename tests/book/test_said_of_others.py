@@ -6,7 +6,7 @@ from stable_baselines3 import PPO
 
 
 def test_defaults_of_stable_baselines3() -> None:
-    """Chapter 5: no entropy bonus by default. Chapter 9: `target_kl` stops an update early."""
+    """*KL invariance*: no entropy bonus by default. *Many steps from one batch*: `target_kl` stops an update early."""
     parameters = inspect.signature(PPO.__init__).parameters
     assert parameters["ent_coef"].default == 0
     assert "target_kl" in parameters

@@ -17,6 +17,8 @@ from inbounds.book.exercises.judging import Judgement
 from tests.book.exercises import (
     test_actions_have_bounds,
     test_beta_policies,
+    test_clipped_divergence,
+    test_f_divergences,
     test_greedy_action,
     test_kl_invariance,
     test_logit_normal_density,

@@ -1,4 +1,4 @@
-"""The grader of *Every divergence, and every map* passes the right answer, found otherwise, and names the known mistakes."""
+"""The grader of *Every divergence, and every map* passes a right answer and names the known mistakes."""
 
 from collections.abc import Callable
 
