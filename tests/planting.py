@@ -21,6 +21,7 @@ LIBRARIES = [
         "pytest",
         "hypothesis",
         "torch",
+        "numba",
         "scipy.stats",
         "mpmath",
         "mujoco",

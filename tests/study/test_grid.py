@@ -9,7 +9,17 @@ import pytest
 from inbounds.learning import preset
 from inbounds.learning.storage import stored_config
 from inbounds.learning.storage.stored_config import describe
-from inbounds.study.grid import AFTERWARDS, ARMS, ROBOTS, VARIANTS, Cell, all_cells, select, study_cells
+from inbounds.study.grid import (
+    AFTERWARDS,
+    ARMS,
+    ROBOTS,
+    VARIANTS,
+    Cell,
+    all_cells,
+    digest_of,
+    select,
+    study_cells,
+)
 from inbounds.study.ledger import CLAIMS
 from inbounds.study.statistics import settings
 
@@ -70,6 +80,13 @@ def test_the_numbers_of_the_analysis_are_those_of_the_protocol() -> None:
         settings.FINAL_FRACTION,
         settings.LAST_EVALUATIONS,
     ]
+
+
+def test_autograds_digests_are_those_of_the_first_study() -> None:
+    """Whose configurations did not name the engine; a cell of the other engine is another cell."""
+    (cell,) = select(["standard-swimmer-ppo-gaussian"])
+    assert cell.digest == "632bd5eab74623bd7553ec563c40a48a571ca93ee0495168a6fb153470e45f06"
+    assert digest_of(dataclasses.replace(cell.config, engine="compiled")) != cell.digest
 
 
 def test_ids_and_digests_are_unique_but_for_nothing() -> None:

@@ -32,7 +32,7 @@ from inbounds.learning.storage.run_store import (
 )
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields
 from inbounds.learning.storage.whole_files import DamagedFileError, held, is_disk_full
-from inbounds.learning.training import Record, make_environments
+from inbounds.learning.training import Record, make_environments, prepare
 from inbounds.robots.registration import TASK_NAMES
 
 
@@ -100,6 +100,14 @@ class _Session:
             if self.wants_tensorboard:
                 board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
+            if config.engine == "compiled":
+                progress.say("compiling the update for this processor; the next run finds it on disk")
+                try:
+                    progress.say(f"compiled, or found on disk, in {prepare(config):.1f} s")
+                except ValueError as error:
+                    if not is_ours(error):
+                        raise
+                    raise CommandError(str(error), 2) from error
             if start:
                 progress.say(f"going on with {self.run_dir}, {start} epochs done")
             try:

@@ -13,7 +13,7 @@ from inbounds.learning.ppo import PPOConfig
 from inbounds.learning.rollout import Collector, Rollout
 from inbounds.learning.storage.run_store import load_policies, load_policy, policies_of, read_curves, save_run
 from inbounds.learning.storage.trained_policy import TrainedPolicy
-from inbounds.learning.training import DivergedSeedWarning, Trainer, train
+from inbounds.learning.training import DivergedSeedWarning, Trainer, prepare, train
 from inbounds.learning.trpo import TRPOConfig
 
 __all__ = [
@@ -44,6 +44,7 @@ __all__ = [
     "mlp",
     "normalize_advantage",
     "policies_of",
+    "prepare",
     "preset",
     "read_curves",
     "save_run",

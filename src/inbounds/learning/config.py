@@ -55,6 +55,9 @@ class TrainConfig:
     """Normalise observations by running statistics, per seed."""
     action_mode: Literal["clip", "raw"] = "clip"
     """clip: to the box, before robot and reward see the action. raw: as it was drawn."""
+    engine: Literal["autograd", "compiled"] = "autograd"
+    """autograd: PyTorch's, which the book reads. compiled: the same update in compiled loops, faster; needs the extra
+    `fast`. Their gradient steps differ in the last bits, so that their runs part."""
     checkpoint_every: int = 10
     """Epochs between checkpoints, where a run directory is given; the last epoch always has one."""
 
@@ -65,6 +68,8 @@ class TrainConfig:
             raise ValueError(
                 f"seeds must be different, non-negative integers, at least one; got {self.seeds}"
             )
+        if self.engine not in ("autograd", "compiled"):
+            raise ValueError(f"engine must be autograd or compiled, got {self.engine!r}")
         if self.action_mode not in ("clip", "raw"):
             raise ValueError(f"action_mode must be clip or raw, got {self.action_mode!r}")
 

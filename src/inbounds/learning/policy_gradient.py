@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from torch import Tensor
@@ -22,6 +23,9 @@ from inbounds.learning.rollout import Rollout
 from inbounds.learning.updates.checks import check, check_minibatches
 from inbounds.learning.updates.diagnostics import diagnose
 from inbounds.learning.updates.value import fit_values
+
+if TYPE_CHECKING:  # numba is an extra
+    from inbounds.learning.updates.compiled import CompiledAdam
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class Optimizers:
     """
 
     actor: SeedAdam
-    critic: SeedAdam
+    critic: SeedAdam | CompiledAdam
 
     def state_dict(self) -> dict[str, object]:
         """Return both states."""
@@ -84,12 +88,14 @@ class Optimizers:
         self.critic.load_state_dict(state["critic"])
 
 
-def make_optimizer(networks: ActorCritic, config: PolicyGradientConfig) -> Optimizers:
-    """Return the optimisers of the policy and of the value network."""
+def make_optimizer(
+    networks: ActorCritic, config: PolicyGradientConfig, adam: type[Any] = SeedAdam
+) -> Optimizers:
+    """Return the optimisers of the policy, autograd's under any engine, and of the value network."""
     eps, norm = config.adam_eps, config.max_grad_norm
     return Optimizers(
         SeedAdam([networks.actor], config.policy_learning_rate, eps, norm),
-        SeedAdam([networks.critic], config.learning_rate, eps, norm),
+        adam([networks.critic], config.learning_rate, eps, norm),
     )
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -25,6 +26,9 @@ from inbounds.learning.rollout import Rollout
 from inbounds.learning.updates.checks import check, check_minibatches
 from inbounds.learning.updates.diagnostics import diagnose
 from inbounds.learning.updates.minibatches import Minibatch, minibatches
+
+if TYPE_CHECKING:  # numba is an extra
+    from inbounds.learning.updates.compiled import CompiledAdam
 
 
 @dataclass(frozen=True)
@@ -72,9 +76,9 @@ class PPOConfig:
         check_minibatches(self.horizon, self.minibatch_size, together)
 
 
-def make_optimizer(networks: ActorCritic, config: PPOConfig) -> SeedAdam:
-    """Return the one Adam that moves policy and value networks together."""
-    return SeedAdam(networks.networks, config.learning_rate, config.adam_eps, config.max_grad_norm)
+def make_optimizer(networks: ActorCritic, config: PPOConfig, adam: type[Any] = SeedAdam) -> Any:
+    """Return the one Adam that moves policy and value networks together: the engine's, `SeedAdam` or `CompiledAdam`."""
+    return adam(networks.networks, config.learning_rate, config.adam_eps, config.max_grad_norm)
 
 
 def clipped_surrogate(log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, clip_range: float) -> Tensor:
@@ -132,7 +136,7 @@ def loss(networks: ActorCritic, batch: Minibatch, config: PPOConfig) -> Tensor:
 
 def update(
     networks: ActorCritic,
-    optimizer: SeedAdam,
+    optimizer: SeedAdam | CompiledAdam,
     rollout: Rollout,
     generators: Sequence[np.random.Generator],
     config: PPOConfig,
@@ -159,11 +163,15 @@ def update(
         ['approx_kl', 'clip_fraction', 'entropy', 'explained_variance', 'kl']
     """
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
-    for _ in range(config.num_epochs):
-        for batch in minibatches(
-            rollout, advantage, return_, config.minibatch_size, generators, config.normalize_advantage
-        ):
-            optimizer.minimize(loss(networks, batch, config))
+    if isinstance(optimizer, SeedAdam):
+        for _ in range(config.num_epochs):
+            for batch in minibatches(
+                rollout, advantage, return_, config.minibatch_size, generators, config.normalize_advantage
+            ):
+                optimizer.minimize(loss(networks, batch, config))
+    else:
+        (generator,) = generators
+        optimizer.ppo_passes(networks.policy, rollout, advantage, return_, generator, config)
     diagnostics, ratio = diagnose(networks, rollout, return_)
     beyond = (ratio - 1).abs() > config.clip_range
     return diagnostics | {"clip_fraction": beyond.to(ratio.dtype).mean(1)}

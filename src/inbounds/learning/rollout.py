@@ -7,9 +7,10 @@ the rollout, from whole arrays. The environments must reset within the step that
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -25,6 +26,9 @@ from inbounds.learning.families.policy import SATURATION_MARGIN, ActionMode
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.networks.normalizer import RunningNormalizer
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
+
+if TYPE_CHECKING:  # numba is an extra
+    from inbounds.learning.networks.compiled_acting import CompiledActing
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,18 @@ class Rollout:
         """T."""
         return self.reward.shape[1]
 
+    def seed(self, index: int) -> Rollout:
+        """Return a copy of one seed's steps, S = 1."""
+        row = slice(index, index + 1)
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        tensors = {name: x[row].clone() for name, x in values.items() if isinstance(x, Tensor)}
+        return Rollout(
+            **values
+            | tensors
+            | {name: values[name][row] for name in ("saturation", "action_std", "episode_returns")}
+            | {"parameters": self.parameters.each(lambda x: x[row].clone())}
+        )
+
     def advantages(self, gamma: float, gae_lambda: float) -> tuple[Tensor, Tensor]:
         """Return advantages and returns, `[S, T]` each: `gae` of this rollout."""
         return gae(
@@ -88,6 +104,8 @@ class Collector:
         streams: the generators of each seed.
         normalize_obs: keep running statistics and show the networks normalised observations.
         action_mode: "clip" actions to the box before the environment sees them, or pass them "raw".
+        acting: of the engine `compiled`, under which values and log-densities, too, are a seed's own matter; None acts
+            and evaluates in NumPy and torch, all seeds side by side.
 
     Raises:
         ValueError: the environments reset in another way, are not as many as the seeds, or have no Boxes of the
@@ -108,10 +126,14 @@ class Collector:
         streams: Sequence[SeedStreams],
         normalize_obs: bool,
         action_mode: ActionMode = "clip",
+        acting: CompiledActing | None = None,
     ) -> None:
         check_environments(envs, len(streams))
         self.envs, self.networks, self.policy = envs, networks, networks.policy
-        self.streams, self.action_mode = streams, action_mode
+        self.streams, self.action_mode, self._acting = streams, action_mode, acting
+        self._act, self._judge = networks.actor.act, networks.critic.act
+        if acting is not None:
+            self._act, self._judge = acting.policy, acting.value
         self.dtype = np.dtype(str(networks.dtype).removeprefix("torch."))
         self.obs_dim = gymnasium.spaces.flatdim(envs.single_observation_space)
         self.normalizer = RunningNormalizer(len(streams), self.obs_dim, self.dtype) if normalize_obs else None
@@ -148,7 +170,7 @@ class Collector:
         with np.errstate(invalid="ignore"):  # a diverged seed computes with NaN, in silence
             for t in range(horizon):
                 obs[:, t] = self.obs
-                parameters = self.policy.parameters(self.networks.actor.act(self.obs), np)
+                parameters = self.policy.parameters(self._act(self.obs), np)
                 latent[:, t] = z = draw(parameters, t)
                 action[:, t] = executed = self.policy.execute(z, self.action_mode)
                 next_obs, reward[:, t], terminated[:, t], truncated[:, t], info = self.envs.step(executed)
@@ -158,7 +180,7 @@ class Collector:
                     if truncated[:, t].any():
                         bootstrap[:, t] = self._final_values(truncated[:, t], info)
                 self.obs = self._see(next_obs)
-            last = self.networks.critic.act(self.obs)[:, 0]
+            last = self._judge(self.obs)[:, 0]
         bootstrap[:, -1] = np.where(truncated[:, -1], bootstrap[:, -1], last)
         return self._rollout(
             obs, latent, action, reward, terminated, truncated, bootstrap, episode_returns=episode_returns
@@ -169,6 +191,8 @@ class Collector:
         obs = np.reshape(obs, (len(self.streams), -1))
         if self.normalizer is None:
             return obs.astype(self.dtype)
+        if self._acting is not None:
+            return self._acting.see(self.normalizer, obs)
         self.normalizer.update(obs)
         return self.normalizer(obs)
 
@@ -187,16 +211,13 @@ class Collector:
         for s in np.flatnonzero(truncated):
             final_obs[s] = np.ravel(info["final_obs"][s])
         seen = final_obs.astype(self.dtype) if self.normalizer is None else self.normalizer(final_obs)
-        return np.where(truncated, self.networks.critic.act(seen)[:, 0], 0)
+        return np.where(truncated, self._judge(seen)[:, 0], 0)
 
     def _rollout(self, *arrays: NDArray[Any], episode_returns: list[list[float]]) -> Rollout:
         """Compute once, from whole arrays, what acting did not need."""
         tensors = [torch.from_numpy(array) for array in arrays]
         obs, latent, action, reward, terminated, truncated, bootstrap = tensors
-        with torch.no_grad():
-            parameters = self.networks.parameters(obs)
-            log_prob = self.policy.law.log_prob(parameters, latent)
-            value = self.networks.values(obs).contiguous()
+        parameters, log_prob, value = self._evaluate(obs, latent)
         unit = (arrays[2] - self.policy.centre) / self.policy.half_range  # [S, T, A] executed
         return Rollout(
             obs=obs,
@@ -213,6 +234,18 @@ class Collector:
             action_std=np.sqrt(np.clip(unit, -1, 1).var(1).mean(1)),
             episode_returns=episode_returns,
         )
+
+    def _evaluate(self, obs: Tensor, latent: Tensor) -> tuple[Parameters, Tensor, Tensor]:
+        """Return what `evaluate` does; under the engine `compiled`, seed by seed."""
+        if self._acting is None:
+            return evaluate(self.networks, obs, latent)
+        alone = [
+            evaluate(self.networks.seed(s), obs[s : s + 1].clone(), latent[s : s + 1].clone())
+            for s in range(len(obs))
+        ]
+        parameters, log_prob, value = zip(*alone, strict=True)
+        together = map(torch.cat, zip(*parameters, strict=True))
+        return type(parameters[0])(*together), torch.cat(log_prob), torch.cat(value)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the future depends on; physics included, if the environments have `get_state`."""
@@ -236,6 +269,14 @@ class Collector:
             unwrapped: Any = self.envs.unwrapped
             unwrapped.set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
+
+
+@torch.no_grad()
+def evaluate(networks: ActorCritic, obs: Tensor, latent: Tensor) -> tuple[Parameters, Tensor, Tensor]:
+    """Return the law's parameters `[S, T, A]`, the log-densities of the latents and the values, `[S, T]` each."""
+    parameters = networks.parameters(obs)
+    log_prob = networks.policy.law.log_prob(parameters, latent)
+    return parameters, log_prob, networks.values(obs).contiguous()
 
 
 def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:

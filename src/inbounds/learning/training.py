@@ -9,12 +9,14 @@
 set of wheels this holds to the last bit for any two runs of two seeds or more, whatever the row a seed has in each,
 and even if a neighbour's numbers are all NaN. A seed *alone* takes another path through the matrix library and agrees
 to the rounding of a single gradient step (measured over a few updates: 1e-7 in float32, 1e-15 in float64), which a
-long run in chaotic physics amplifies. The number of threads does not matter: training uses one.
+long run in chaotic physics amplifies. Under the engine `compiled`, where each seed is learned from by itself, a seed
+alone is bit for bit the seed in company, too. The number of threads does not matter: training uses one.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +28,7 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from numpy.typing import NDArray
+from torch import Tensor
 
 from inbounds import robots
 from inbounds.distributions.boxes import require_box
@@ -39,6 +42,7 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import held
+from inbounds.learning.updates.engine import compiled_engine
 from inbounds.robots.registration import TASK_NAMES
 
 Record: TypeAlias = dict[str, Any]
@@ -59,7 +63,8 @@ class Trainer:
 
     Raises:
         ValueError: the environments are not ones that a `Collector` can act in, their bounds are not finite and in
-            order, or no parameters give the `initial_std` that the policy asks for.
+            order, no parameters give the `initial_std` that the policy asks for, or the engine `compiled` is not to be
+            had: the extra `fast` is missing, or the family has no kernels.
 
     Example:
         >>> from inbounds.learning.config import preset
@@ -78,15 +83,21 @@ class Trainer:
         box: Any = self.envs.single_action_space
         require_box(box)
         policy = Policy(config.policy, box.low, box.high)
+        self._compiled = compiled_engine(policy.family) if config.engine == "compiled" else None
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
         generators = [stream.initialization for stream in self.streams]
         with one_thread():  # orthogonal initial weights depend on the number of threads, in their last bits
             self.networks = ActorCritic(policy, obs_dim, config.network, generators)
-        self.collector = Collector(
-            self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode
-        )
         self._algorithm = ALGORITHMS[config.algorithm_name][1]
-        self.optimizer = self._algorithm.make_optimizer(self.networks, config.algorithm)
+        make_optimizer, acting = self._algorithm.make_optimizer, None
+        if self._compiled is not None:
+            acting = self._compiled.CompiledActing(self.networks)
+            self.optimizer = self._compiled.SeedBySeed(self.networks, make_optimizer, config.algorithm)
+        else:
+            self.optimizer = make_optimizer(self.networks, config.algorithm)
+        self.collector = Collector(
+            self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode, acting
+        )
         self.rollout: Rollout | None = None
         """What the last epoch learned from."""
         self.records: list[Record] = []
@@ -99,10 +110,10 @@ class Trainer:
         start = time.perf_counter()
         algorithm = self.config.algorithm
         self.rollout = None  # two would take twice the memory
-        with one_thread():
+        one_blas_thread = self._compiled.one_blas_thread if self._compiled else contextlib.nullcontext
+        with one_thread(), one_blas_thread():
             self.rollout = rollout = self.collector.collect(algorithm.horizon)
-            shuffles = [stream.shuffle for stream in self.streams]
-            diagnostics = self._algorithm.update(self.networks, self.optimizer, rollout, shuffles, algorithm)
+            diagnostics = self._update(rollout)
         self._mark_diverged(rollout)
         record: Record = {
             "epoch": len(self.records),
@@ -116,6 +127,14 @@ class Trainer:
         }
         self.records.append(record)
         return record
+
+    def _update(self, rollout: Rollout) -> dict[str, Tensor]:
+        """Do the algorithm's update: all seeds side by side, or under the engine `compiled` one after another."""
+        update, algorithm = self._algorithm.update, self.config.algorithm
+        shuffles = [stream.shuffle for stream in self.streams]
+        if self._compiled is not None:
+            return self.optimizer.update(update, rollout, shuffles, algorithm)
+        return update(self.networks, self.optimizer, rollout, shuffles, algorithm)
 
     def _mark_diverged(self, rollout: Rollout) -> None:
         """Mark, and warn of, the seeds whose weights have just ceased to be finite; say where that came from."""
@@ -258,6 +277,32 @@ def train(
             if callback is not None:
                 callback(trainer, record)
     return trainer
+
+
+def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None = None) -> float:
+    """Have everything compiled that a run under the engine `compiled` calls, or loaded from where it is kept.
+
+    The first epoch of a run does so by itself, and takes that much longer.
+
+    Args:
+        config: of the run.
+        make_envs: as `Trainer` takes it.
+
+    Returns:
+        Seconds it took: some ten the first time, less than one later, where there is a place to keep what is compiled
+        (the package's folder, or the user's cache).
+
+    Example:
+        >>> prepare(TrainConfig("Swimmer-v5")) < 1  # nothing to compile for autograd
+        True
+    """
+    start = time.perf_counter()
+    if config.engine == "compiled":
+        short = dataclasses.replace(config.algorithm, horizon=config.algorithm.minibatch_size, num_epochs=1)
+        trainer = Trainer(dataclasses.replace(config, seeds=config.seeds[:1], algorithm=short), make_envs)
+        trainer.epoch()
+        trainer.envs.close()
+    return time.perf_counter() - start
 
 
 def make_environments(config: TrainConfig, num_envs: int) -> Environments:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -33,6 +33,9 @@ from inbounds.learning.updates.checks import check, check_minibatches
 from inbounds.learning.updates.diagnostics import diagnose
 from inbounds.learning.updates.minibatches import Minibatch
 from inbounds.learning.updates.value import fit_values
+
+if TYPE_CHECKING:  # numba is an extra
+    from inbounds.learning.updates.compiled import CompiledAdam
 
 Product = Callable[[Tensor], Tensor]
 """Maps vectors `[S, P]`, one per seed, to matrix-vector products `[S, P]`."""
@@ -89,9 +92,9 @@ class TRPOConfig:
             raise ValueError(f"fisher must be hessian or sampled, got {self.fisher!r}")
 
 
-def make_optimizer(networks: ActorCritic, config: TRPOConfig) -> SeedAdam:
+def make_optimizer(networks: ActorCritic, config: TRPOConfig, adam: type[Any] = SeedAdam) -> Any:
     """Return the Adam of the value network; the policy's step is its own."""
-    return SeedAdam([networks.critic], config.learning_rate, config.adam_eps, config.max_grad_norm)
+    return adam([networks.critic], config.learning_rate, config.adam_eps, config.max_grad_norm)
 
 
 def kl_hessian_product(networks: ActorCritic, obs: Tensor) -> Product:
@@ -313,7 +316,7 @@ def natural_step(
 
 def update(
     networks: ActorCritic,
-    optimizer: SeedAdam,
+    optimizer: SeedAdam | CompiledAdam,
     rollout: Rollout,
     generators: Sequence[np.random.Generator],
     config: TRPOConfig,

@@ -141,8 +141,13 @@ class Cell:
 
 
 def digest_of(config: TrainConfig) -> str:
-    """Return the SHA-256 of the study's version and a configuration, but for how often it saves."""
+    """Return the SHA-256 of the study's version and a configuration, but for how often it saves.
+
+    The engine `autograd` is not named: it was the only one when the first cells were run.
+    """
     values = describe(config) | {"checkpoint_every": None, "study_version": STUDY_VERSION}
+    if config.engine == "autograd":
+        del values["engine"]
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 

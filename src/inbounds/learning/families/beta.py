@@ -151,4 +151,5 @@ FAMILY = Family(
     executed_std=lambda concentration: 1 / math.sqrt(2 * concentration + 1),
     scales=lambda limits: (limits.concentration_max, 1.0),
     head_bias=beta_head_bias,
+    kernels="inbounds.learning.families.beta_kernel",
 )

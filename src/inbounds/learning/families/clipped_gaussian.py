@@ -62,4 +62,5 @@ FAMILY = Family(
     executed_std=clipped_std,
     scales=normal_scales,
     head_bias=lambda std, limits: normal_head_bias(clipped_std, std, limits),
+    kernels="inbounds.learning.families.clipped_gaussian_kernel",
 )

@@ -126,6 +126,7 @@ class Family:
         executed_std: standard deviation of the executed unit action, of a law centred in the box, by its scale.
         scales: the scales of the least and of the most noise within the limits.
         head_bias: the inverse of `executed_std`, as the two outputs of the network that give such a law.
+        kernels: the module with `score` and `entropy_slope` for the engine `compiled`; None has no such engine.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Family:
     executed_std: Callable[[float], float]
     scales: Callable[[Limits], tuple[float, float]]
     head_bias: Callable[[float, Limits], tuple[float, float]]
+    kernels: str | None = None
 
 
 def clip(x: Array, low: float, high: float) -> Array:

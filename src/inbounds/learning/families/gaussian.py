@@ -149,4 +149,5 @@ FAMILY = Family(
     executed_std=clipped_std,
     scales=normal_scales,
     head_bias=lambda std, limits: normal_head_bias(clipped_std, std, limits),
+    kernels="inbounds.learning.families.gaussian_kernel",
 )

@@ -52,7 +52,7 @@ class _ExpectedLogSlope(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, loc: Tensor, log_scale: Tensor) -> Tensor:
-        nodes, weights = _nodes_and_weights(loc.dtype)
+        nodes, weights = nodes_and_weights(loc.dtype)
         scale = np.exp(log_scale.numpy()).ravel()
         # [N, M], soon z/2; in place, because fresh memory costs more than arithmetic
         half = nodes[:, None] * scale
@@ -77,7 +77,8 @@ class _ExpectedLogSlope(torch.autograd.Function):
 
 
 @functools.cache
-def _nodes_and_weights(dtype: torch.dtype) -> tuple[NDArray[Any], NDArray[Any]]:
+def nodes_and_weights(dtype: torch.dtype) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the nodes and weights `[15]` of the bonus entropy's rule for the standard Normal."""
     nodes, weights = trapezoid(15, 5.0, dtype)
     return nodes.numpy(), weights.numpy()
 
@@ -103,4 +104,5 @@ FAMILY = Family(
     executed_std=squashed_std,
     scales=normal_scales,
     head_bias=lambda std, limits: normal_head_bias(squashed_std, std, limits),
+    kernels="inbounds.learning.families.logit_normal_kernel",
 )

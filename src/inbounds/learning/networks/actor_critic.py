@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import torch
 from torch import Tensor
@@ -108,6 +109,12 @@ class ActorCritic:
     def num_seeds(self) -> int:
         """S."""
         return len(self.actor.theta)
+
+    def seed(self, index: int) -> Self:
+        """Return the two networks of one seed, S = 1, which have their weights in common with these."""
+        one = copy.copy(self)
+        one.actor, one.critic = self.actor.seed(index), self.critic.seed(index)
+        return one
 
     @property
     def networks(self) -> tuple[Mlp, Mlp]:

@@ -11,11 +11,12 @@ the layers are views: an optimiser steps on one tensor, and a seed's gradient is
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -117,9 +118,22 @@ class Mlp:
             part.unflatten(1, shape)
             for part, shape in zip(self.padded.grad[:, :count].split(self._lengths, 1), shapes, strict=True)
         ]
+        self._find_layers()
+
+    def _find_layers(self) -> None:
         weights, biases = self.parameters[::2], self.parameters[1::2]
         self.layers = [SeedLinear(*pair) for pair in zip(weights, biases, strict=True)]
         self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
+
+    def seed(self, index: int) -> Self:
+        """Return the perceptron of one seed, S = 1, which has its weights in common with these."""
+        row, one = slice(index, index + 1), copy.copy(self)
+        one.padded, one.theta = self.padded[row], self.theta[row]
+        one.padded.grad = None if self.padded.grad is None else self.padded.grad[row]
+        one.parameters = [part.detach()[row].requires_grad_() for part in self.parameters]
+        one._gradients = [part[row] for part in self._gradients]
+        one._find_layers()
+        return one
 
     def __call__(self, obs: Tensor) -> Tensor:
         """Return the outputs `[S, B, out]` for observations `[S, B, O]`."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from inbounds.learning.config import ALGORITHMS, TrainConfig
@@ -17,6 +18,8 @@ from inbounds.learning.storage.stored_config import describe
 METADATA_KEY = "inbounds"
 FORMAT = 1
 PACKAGES = ("gymnasium", "inbounds", "mujoco", "numpy", "scipy", "torch")
+COMPILERS = ("llvmlite", "numba")
+"""They decide the bits of a result of the engine `compiled`, and are not always there."""
 
 
 def metadata_of(config: TrainConfig, **more: str) -> str:
@@ -31,7 +34,11 @@ def metadata_of(config: TrainConfig, **more: str) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that decide the bits of a result."""
-    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+    found = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+    for name in COMPILERS:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def config_from(metadata: Mapping[str, Any]) -> TrainConfig:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from torch import Tensor
@@ -12,10 +13,13 @@ from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.rollout import Rollout
 from inbounds.learning.updates.minibatches import minibatches
 
+if TYPE_CHECKING:  # numba is an extra
+    from inbounds.learning.updates.compiled import CompiledAdam
+
 
 def fit_values(
     networks: ActorCritic,
-    optimizer: SeedAdam,
+    optimizer: SeedAdam | CompiledAdam,
     rollout: Rollout,
     return_: Tensor,
     generators: Sequence[np.random.Generator],
@@ -26,13 +30,17 @@ def fit_values(
 
     Args:
         networks: whose critic to change.
-        optimizer: over the critic alone.
+        optimizer: over the critic alone, of either engine.
         rollout: `[S, T, ...]`.
         return_: `[S, T]` targets.
         generators: one per seed, for the order of its minibatches.
         num_epochs: passes over the rollout.
         minibatch_size: B, a divisor of T.
     """
+    if not isinstance(optimizer, SeedAdam):
+        (generator,) = generators
+        optimizer.value_passes(rollout, return_, generator, num_epochs, minibatch_size)
+        return
     for _ in range(num_epochs):
         for batch in minibatches(rollout, return_, return_, minibatch_size, generators):
             error = networks.values(batch.obs) - batch.return_

@@ -1,0 +1,31 @@
+"""`inbounds train --engine compiled`."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from inbounds.learning import load_policy
+from tests.cli.small import run, small, succeeds
+
+
+def test_the_compiled_engine_says_how_long_compiling_took_and_stays_with_its_run(tmp_path: Path) -> None:
+    said = succeeds(small(tmp_path / "run", 1, "Swimmer-v5", "--engine", "compiled"))
+    first, second, *_ = said.splitlines()
+    assert first == "compiling the update for this processor; the next run finds it on disk"
+    assert re.fullmatch(r"compiled, or found on disk, in \d+\.\d s", second)
+    assert load_policy(tmp_path / "run").config.engine == "compiled"
+    code, _, err = run(*small(tmp_path / "run", 2, "Swimmer-v5"))
+    assert code == 2
+    assert "another configuration (--engine compiled there, autograd here)" in err
+    assert "epoch 2/2" in succeeds(small(tmp_path / "run", 2, "Swimmer-v5", "--engine", "compiled"))
+
+
+def test_the_compiled_engine_without_numba_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("inbounds.learning.updates.engine.NEEDS", ("a_compiler_that_nobody_has",))
+    code, _, err = run(*small(tmp_path / "run", 1, "Swimmer-v5", "--engine", "compiled"))
+    assert code == 2
+    assert "needs a_compiler_that_nobody_has, of the extra `fast`: pip install '.[fast]'" in err
+    assert not (tmp_path / "run").exists()
