@@ -546,10 +546,10 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "a grader takes no answer for a wrong one",
-        "book/exercises/beta_policies.py",
+        "book/exercises/beta_spread_and_region.py",
         "return NO_POLICY if answer is None else answer",
         "return answer",
-        "tests/book/exercises/test_beta_policies.py::test_known_mistakes_are_named",
+        "tests/book/exercises/test_beta_spread_and_region.py::test_known_mistakes_are_named",
     ),
     Mutant(
         "stable-baselines3 scores the rounded action",

@@ -1,84 +1,72 @@
-"""The graders of *Beta policies* pass the right answers and name the known mistakes."""
+"""The grader of *Beta policies* passes the right log-density and names the known mistakes."""
 
+import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 import torch
-from torch.distributions import Beta, kl_divergence
 
 from inbounds.book.exercises import beta_policies as graders
+from inbounds.distributions import ScaledBeta
 
 
-def moments(mean, std, low, high, cap):
-    """By torch's own moments: bisection on the total, which sets the variance."""
-    length = high - low
-    m, smallest, largest = (mean - low) / length, 1e-6, 1e9
-    for _ in range(200):
-        total = (smallest * largest) ** 0.5
-        law = Beta(torch.tensor(m * total, dtype=torch.float64), (1 - m) * total)
-        if law.stddev.item() * length > std:
-            smallest = total
-        else:
-            largest = total
-    pair = m * total, (1 - m) * total
-    return pair if min(pair) >= 1 and max(pair) <= cap else None
+def by_the_package(action, alpha, beta, low, high):
+    """An independent road: the package's law."""
+    numbers = (torch.tensor(x, dtype=torch.float64) for x in (action, alpha, beta, low, high))
+    a, *law = numbers
+    return ScaledBeta(*law).log_prob(a).item()
 
 
-def torchs_kl(alpha, beta, alpha_new, beta_new):
-    old, new = Beta(alpha.double(), beta.double()), Beta(alpha_new.double(), beta_new.double())
-    return kl_divergence(old, new).float()
+RIGHT = {"beta_log_prob": by_the_package}
 
 
-RIGHT = {"match_moments": moments, "safe_beta_kl": torchs_kl}
+def fraction(action, low, high):
+    return (action - low) / (high - low)
 
 
-def uncapped(mean, std, low, high, cap):
-    return moments(mean, std, low, high, 1e9)
+def overflowing(action, alpha, beta, low, high):
+    """The normaliser as a quotient of gamma functions."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = fraction(action, low, high)
+        gamma = [math.gamma(t) if t < 170 else math.inf for t in (alpha, beta, alpha + beta)]
+        density = x ** (alpha - 1) * (1 - x) ** (beta - 1) * np.float64(gamma[2]) / gamma[0] / gamma[1]
+        return np.log(density / (high - low))
 
 
-def unbounded(mean, std, low, high, cap):
-    m, v = (mean - low) / (high - low), (std / (high - low)) ** 2
-    total = m * (1 - m) / v - 1
-    return None if max(m * total, (1 - m) * total) > cap else (m * total, (1 - m) * total)
+def shifted(by):
+    """Right, but for a term."""
+    return lambda a, *rest: by_the_package(a, *rest) + by(fraction(a, *rest[2:]), *rest)
 
 
-def forgetting(mean, std, low, high, cap, alpha=True, beta=True, small_alpha=True, small_beta=True):
-    """Right, but for one of the four conditions."""
-    a, b = unbounded(mean, std, low, high, 1e9)
-    tests = (alpha and a > cap, beta and b > cap, small_alpha and a < 1, small_beta and b < 1)
-    return None if any(tests) else (a, b)
+def log_b(alpha, beta):
+    return math.lgamma(alpha) + math.lgamma(beta) - math.lgamma(alpha + beta)
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong", "words"),
+    ("wrong", "words"),
     [
-        ("match_moments", lambda *a: moments(*a) and moments(*a)[::-1], "changed places"),
-        (
-            "match_moments",
-            lambda m, s, lo, hi, c: moments((m - lo) / (hi - lo), s, 0, 1, c),
-            "units of the action",
-        ),
-        ("match_moments", lambda *a: None, "refuse"),
-        ("match_moments", lambda *a: (1.0, 1.0), "wrong α or β"),
-        ("match_moments", unbounded, "below 1"),
-        ("match_moments", uncapped, "above the cap"),
-        ("match_moments", lambda m, s, lo, hi, c: moments(m, s, lo, hi, 80.0), "is an argument"),
-        ("match_moments", lambda *a: forgetting(*a, alpha=False), "above the cap"),
-        ("match_moments", lambda *a: forgetting(*a, beta=False), "above the cap"),
-        ("match_moments", lambda *a: forgetting(*a, small_alpha=False), "below 1"),
-        ("match_moments", lambda *a: forgetting(*a, small_beta=False), "below 1"),
-        ("safe_beta_kl", lambda a, b, c, d: torchs_kl(c, d, a, b), "changed places"),
-        ("safe_beta_kl", lambda *four: -torchs_kl(*four), "minus the divergence"),
-        ("safe_beta_kl", lambda *four: torchs_kl(*four).double(), "type"),
-        (
-            "safe_beta_kl",
-            lambda *four: torch.from_numpy(graders.float32_kl(*four)),
-            "single precision cancels",
-        ),
-        ("safe_beta_kl", lambda a, b, c, d: kl_divergence(Beta(a, b), Beta(c, d)), "single precision"),
+        (shifted(lambda x, a, b, lo, hi: math.log(hi - lo)), "length of the interval is missing"),
+        (shifted(lambda x, a, b, lo, hi: 2 * math.log(hi - lo)), "do not multiply"),
+        (lambda y, a, b, lo, hi: by_the_package(y, b, a, lo, hi), "changed places"),
+        (shifted(lambda x, a, b, lo, hi: log_b(a, b)), "normaliser is missing"),
+        (shifted(lambda x, a, b, lo, hi: 2 * log_b(a, b)), "sign of log B"),
+        (shifted(lambda x, a, b, lo, hi: math.log(x) + math.log(1 - x)), "exponents"),
+        (lambda *args: math.exp(by_the_package(*args)), "return its logarithm"),
+        (overflowing, "overflows"),
+        (lambda *_: 0.5, ""),
     ],
 )
-def test_known_mistakes_are_named(name: str, wrong: Callable, words: str) -> None:
-    verdict = getattr(graders, name)(wrong)
+def test_known_mistakes_are_named(wrong: Callable, words: str) -> None:
+    verdict = graders.beta_log_prob(wrong)
     assert verdict.passed is False, verdict
     assert words in verdict.message
+
+
+def test_units_are_named() -> None:
+    def unscaled(action, alpha, beta, low, high):
+        if not 0 < action < 1:
+            return math.nan
+        return by_the_package(action, alpha, beta, 0.0, 1.0) - math.log(high - low)
+
+    assert "fraction" in graders.beta_log_prob(unscaled).message

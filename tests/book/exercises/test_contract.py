@@ -17,12 +17,15 @@ from inbounds.book.exercises.judging import Judgement
 from tests.book.exercises import (
     test_actions_have_bounds,
     test_beta_policies,
+    test_beta_spread_and_region,
     test_clipped_divergence,
+    test_digits_of_a_beta,
     test_f_divergences,
     test_greedy_action,
     test_kl_invariance,
     test_logit_normal_density,
     test_logit_normal_moments,
+    test_six_untrained_robots,
     test_tanh_gaussian,
     test_trpo,
 )
@@ -39,12 +42,15 @@ RIGHT = [
     for chapter, answers in {
         "actions_have_bounds": test_actions_have_bounds.RIGHT,
         "beta_policies": test_beta_policies.RIGHT,
+        "beta_spread_and_region": test_beta_spread_and_region.RIGHT,
         "clipped_divergence": test_clipped_divergence.RIGHT,
+        "digits_of_a_beta": test_digits_of_a_beta.RIGHT,
         "f_divergences": test_f_divergences.RIGHT,
         "greedy_action": test_greedy_action.RIGHT,
         "kl_invariance": test_kl_invariance.RIGHT,
         "logit_normal_density": test_logit_normal_density.RIGHT,
         "logit_normal_moments": test_logit_normal_moments.RIGHT,
+        "six_untrained_robots": test_six_untrained_robots.RIGHT,
         "tanh_gaussian": test_tanh_gaussian.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
     }.items()
