@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from inbounds.study import StudyFolder, all_cells
-from inbounds.study.grid import STUDY_VERSION
+from inbounds.study.cell import STUDY_VERSION
 from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
 from inbounds.study.store import COLUMNS
 

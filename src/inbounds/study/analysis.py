@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inbounds.study import statistics
-from inbounds.study.grid import ROBOTS, STUDY_VERSION
+from inbounds.study.cell import ROBOTS, STUDY_VERSION
 from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate, Profile
 from inbounds.study.statistics.intervals import StatisticName
@@ -69,15 +69,15 @@ REFERENCE = Column("standard", "ppo", "gaussian")
 """Whose first epoch is 0 and whose final return is 1 in normalised scores."""
 
 
-def generator_for(*name: object) -> np.random.Generator:
-    """Return the generator of a number, by what the number is called.
+def generator_for(*name: object, version: int = STUDY_VERSION) -> np.random.Generator:
+    """Return the generator of a number, by what the number is called and the version of its study.
 
     Example:
         >>> a, b = generator_for("final", "Hopper"), generator_for("final", "Hopper")
         >>> bool(a.random() == b.random())
         True
     """
-    words = "|".join(map(str, ("study", STUDY_VERSION, *name)))
+    words = "|".join(map(str, ("study", version, *name)))
     return np.random.default_rng(int.from_bytes(hashlib.sha256(words.encode()).digest()[:16]))
 
 
@@ -124,7 +124,7 @@ def curve(outcome: Outcome) -> Estimate | None:
     estimate = statistics.learning_curve(
         outcome.returns, generator_for("curve", outcome.cell.id), missing="exclude"
     )
-    return _marked(estimate, outcome)
+    return marked(estimate, outcome)
 
 
 def estimate(
@@ -144,7 +144,7 @@ def estimate(
         return None
     rng = generator_for("estimate", outcome.cell.id, endpoint, statistic, without_diverged)
     found = statistics.bootstrap(values, rng, statistic=statistic, missing="exclude")
-    return found if without_diverged else _marked(found, outcome)
+    return found if without_diverged else marked(found, outcome)
 
 
 def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
@@ -158,7 +158,7 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
     """
     mean = functools.partial(statistics.bootstrap, statistic="mean", missing="exclude")
     return {
-        way: _marked(mean(values, generator_for("way", outcome.cell.id, way)), outcome)
+        way: marked(mean(values, generator_for("way", outcome.cell.id, way)), outcome)
         if _countable(values) >= 2
         else None
         for way, values in outcome.ways.items()
@@ -194,7 +194,7 @@ def differences(
     for robot, row in rows.items():
         if row.difference is not None:
             pair = [o for c in contrast.columns if (o := outcomes.find(c, robot)) is not None]
-            rows[robot] = dataclasses.replace(row, difference=_marked(row.difference, *pair))
+            rows[robot] = dataclasses.replace(row, difference=marked(row.difference, *pair))
     return rows
 
 
@@ -219,7 +219,7 @@ def change(outcomes: Outcomes, outcome: Outcome, endpoint: str) -> Estimate | No
         statistic="mean",
         missing="exclude",
     )
-    return _marked(found, outcome, plain)
+    return marked(found, outcome, plain)
 
 
 def references(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
@@ -282,7 +282,7 @@ def aggregate(
         return None
     rng = generator_for("aggregate", *column, endpoint, without_diverged)
     iqm = statistics.aggregate(found, rng, missing="exclude")
-    return iqm if without_diverged else _marked(iqm, *outcomes.of_column(column, found))
+    return iqm if without_diverged else marked(iqm, *outcomes.of_column(column, found))
 
 
 def improvement(
@@ -305,7 +305,7 @@ def improvement(
     rng = generator_for("improvement", *contrast, endpoint, without_diverged)
     better = statistics.probability_of_improvement(first, second, rng, missing="exclude")
     both = [outcome for column in contrast.columns for outcome in outcomes.of_column(column, ROBOTS)]
-    return better if without_diverged else _marked(better, *both)
+    return better if without_diverged else marked(better, *both)
 
 
 def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: ArrayLike) -> Profile | None:
@@ -324,7 +324,7 @@ def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: Array
     whole = statistics.performance_profile(
         found, thresholds, generator_for("profile", *column, endpoint), missing="exclude"
     )
-    return dataclasses.replace(whole, share=_marked(whole.share, *outcomes.of_column(column, found)))
+    return dataclasses.replace(whole, share=marked(whole.share, *outcomes.of_column(column, found)))
 
 
 def _scores_by_robot(
@@ -344,7 +344,7 @@ def _countable(values: Floats) -> int:
     return int(np.isfinite(values).sum())
 
 
-def _marked(estimate: Estimate, *outcomes: Outcome) -> Estimate:
-    """Say how many of the seeds that count have diverged."""
+def marked(estimate: Estimate, *outcomes: Outcome) -> Estimate:
+    """Return an estimate that says how many of the seeds that count have diverged."""
     diverged = sum(int((o.diverged & np.isfinite(o.returns).all(1)).sum()) for o in outcomes)
     return dataclasses.replace(estimate, diverged=diverged)

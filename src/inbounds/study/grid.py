@@ -1,155 +1,25 @@
-"""What is run: cells of algorithm × family × variant × robot, in the order of `results/PROTOCOL.md`.
+"""What is run: the cells of both studies, in the order of their protocols (`results/PROTOCOL.md`, `PROTOCOL-2.md`).
 
     >>> len(study_cells()), [cell.id for cell in select(["standard-swimmer-*"])][:2]
     (136, ['standard-swimmer-ppo-gaussian', 'standard-swimmer-ppo-beta'])
 
-A cell names a run; `Cell.config` spells it out: a preset, changed by the cell's variant.
+What a cell is stands in `inbounds.study.cell`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import fnmatch
-import hashlib
-import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from types import MappingProxyType
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
-from inbounds.learning import TrainConfig, preset
-from inbounds.learning.storage.stored_config import describe
-
-STUDY_VERSION = 1
-"""Raised by whatever changes results: another protocol, another engine. Results of two versions are never mixed."""
-
-ROBOTS = ("HalfCheetah", "Hopper", "Swimmer", "Walker2d", "Ant", "Humanoid")
-"""In the order in which an arm runs them."""
-ENTROPY_COEFS = (0.0, 1e-3, 1e-2)
-MATCHED_NOISE = 0.4  # executed standard deviation before training, of half the action range
-LOUD_NOISE = 0.7  # the same; about the Gaussian's default, and within a logit-normal's limits
-LONG_GAMMA = 0.9999
-
-PresetName: TypeAlias = Literal["common", "as-printed"]
-Variant: TypeAlias = Callable[[TrainConfig], TrainConfig]
-
-
-def _algorithm(**numbers: Any) -> Variant:
-    """Change numbers of the algorithm."""
-    return lambda config: dataclasses.replace(
-        config, algorithm=dataclasses.replace(config.algorithm, **numbers)
-    )
-
-
-def _whole(**values: Any) -> Variant:
-    """Change the run around the algorithm."""
-    return lambda config: dataclasses.replace(config, **values)
-
-
-def _initial_noise(std: float) -> Variant:
-    """Set the executed standard deviation before training."""
-    return lambda config: dataclasses.replace(
-        config, policy=dataclasses.replace(config.policy, initial_std=std)
-    )
-
-
-def _printed_weights(config: TrainConfig) -> TrainConfig:
-    network = dataclasses.replace(config.network, initialization="pytorch")
-    return dataclasses.replace(config, network=network)
-
-
-VARIANTS: Mapping[str, Variant] = MappingProxyType(
-    {
-        "": lambda config: config,
-        "matched-noise": _initial_noise(MATCHED_NOISE),
-        "loud-noise": _initial_noise(LOUD_NOISE),
-        "raw-cost": _whole(action_mode="raw"),
-        **{f"entropy-{coef:g}": _algorithm(entropy_coef=coef) for coef in ENTROPY_COEFS},
-        f"gamma-{LONG_GAMMA}": _algorithm(gamma=LONG_GAMMA),
-        "printed-clip": _algorithm(clip_range=0.02),
-        "printed-observations": _whole(normalize_obs=False),
-        "printed-advantages": _algorithm(normalize_advantage=False),
-        "printed-gradients": _algorithm(max_grad_norm=None),
-        "printed-weights": _printed_weights,
-    }
-)
-"""Name → what it changes in the preset; the empty name changes nothing."""
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One run of the study: ten seeds of an algorithm, a family, a variant and a robot.
-
-    Example:
-        >>> cell = Cell("mechanisms", "ppo", "beta", "Hopper", variant="entropy-0.01")
-        >>> cell.id, cell.config.algorithm.entropy_coef, len(cell.digest)
-        ('mechanisms-hopper-ppo-beta-entropy-0.01', 0.01, 64)
-    """
-
-    arm: str
-    """standard, printed, beyond or mechanisms; tests and readers may use names of their own."""
-    algorithm: str
-    """ppo or trpo."""
-    family: str
-    """The policy family."""
-    robot: str
-    """A robot of `ROBOTS`."""
-    variant: str = ""
-    """A key of `VARIANTS`."""
-    preset: PresetName = "common"
-    """Where the configuration starts from."""
-    keeps_policies: bool = False
-    """Whether its final policies, and their returns under each greedy action, are part of the results."""
-    seeds: tuple[int, ...] = tuple(range(10))
-    """Trained in lockstep."""
-    epochs: int = 500
-    """Rollouts, each followed by one update."""
-    overrides: tuple[tuple[str, Any], ...] = ()
-    """Numbers of the algorithm set last, for short runs: (("horizon", 256),)."""
-
-    def __post_init__(self) -> None:
-        if self.variant not in VARIANTS:
-            raise ValueError(
-                f"no variant {self.variant!r}; choose one of {', '.join(filter(None, VARIANTS))}"
-            )
-        if self.robot not in ROBOTS:
-            raise ValueError(f"no robot {self.robot!r}; choose one of {', '.join(ROBOTS)}")
-
-    @property
-    def id(self) -> str:
-        """Names the cell and its files: unique in the study, sorted by arm and robot."""
-        parts = (self.arm, self.robot.lower(), self.algorithm, self.family, self.variant)
-        return "-".join(part for part in parts if part)
-
-    @property
-    def config(self) -> TrainConfig:
-        """The whole configuration."""
-        start = preset(
-            self.preset,
-            f"{self.robot}-v5",
-            policy=self.family,
-            algo=self.algorithm,
-            seeds=self.seeds,
-            epochs=self.epochs,
-        )
-        return _algorithm(**dict(self.overrides))(VARIANTS[self.variant](start))
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 of the study's version and of every value that decides the cell's results."""
-        return digest_of(self.config)
-
-
-def digest_of(config: TrainConfig) -> str:
-    """Return the SHA-256 of the study's version and a configuration, but for how often it saves.
-
-    The engine `autograd` is not named: it was the only one when the first cells were run.
-    """
-    values = describe(config) | {"checkpoint_every": None, "study_version": STUDY_VERSION}
-    if config.engine == "autograd":
-        del values["engine"]
-    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
-
+from inbounds.study.cell import LEARNING_RATES, NOISES, SECOND_VERSION
+from inbounds.study.cell import LONG_GAMMA as LONG_GAMMA
+from inbounds.study.cell import ROBOTS as ROBOTS
+from inbounds.study.cell import STUDY_VERSION as STUDY_VERSION
+from inbounds.study.cell import VARIANTS as VARIANTS
+from inbounds.study.cell import Cell as Cell
 
 THESIS = (
     ("ppo", "gaussian"),
@@ -224,6 +94,79 @@ AFTERWARDS = tuple(
 """Asked for after results had been seen, and outside the protocol: `results/AFTERWARDS.md` says when and why."""
 
 
+FREE = "free-std"
+EQUAL = ("matched-noise",)  # every family starts with the executed noise 0.4
+FIRST_SEEDS, MORE_SEEDS = tuple(range(10, 20)), tuple(range(20, 30))
+PRIMARY = (("gaussian", FREE), ("beta", ""), ("logit-normal", ""))
+"""The columns, family and variant, of the primary comparison."""
+LAWS = (*PRIMARY, ("gaussian", ""))
+
+
+def _second(
+    arm: str,
+    algorithm: str,
+    columns: Iterable[tuple[str, str]],
+    robots: Sequence[str] = ROBOTS,
+    *,
+    policies: int = 0,
+    **values: Any,
+) -> list[Cell]:
+    """The cells of columns of the second study; the policies of so many seeds are kept, on Humanoid of three."""
+    common = {"seeds": FIRST_SEEDS, "engine": "compiled", "version": SECOND_VERSION} | values
+    return [
+        Cell(
+            arm,
+            algorithm,
+            family,
+            robot,
+            variant,
+            keeps_policies=policies > 0,
+            keeps_seeds=FIRST_SEEDS[: min(policies, 3 if robot == "Humanoid" else policies)] or None,
+            **common,
+        )
+        for family, variant in columns
+        for robot in robots
+    ]
+
+
+def _noise_and_steps() -> tuple[list[Cell], list[Cell]]:
+    """Blocks E and F: other noise, other step sizes."""
+    noises = [f"noise-{std:g}" for std in NOISES]
+    rates = [f"rate-{rate:g}" for rate in LEARNING_RATES]
+    noise = _second("noise", "ppo", product(COMPARED, noises), ("HalfCheetah", "Hopper", "Ant"))
+    steps = [
+        cell
+        for family, free in (("gaussian", (FREE,)), ("beta", ()), ("logit-normal", ()))
+        for cell in _second("steps", "ppo", product([family], rates), ROBOTS[:2], base=(*EQUAL, *free))
+    ]
+    return noise, steps
+
+
+SECOND: Mapping[str, tuple[Cell, ...]] = MappingProxyType(
+    {
+        "B": _by_robot(
+            _second("equal", "ppo", LAWS, policies=10, base=EQUAL)
+            + _second("equal", "ppo", [("logit-normal", FREE)], base=EQUAL)
+        ),
+        "B, more seeds": _by_robot(_second("equal-more", "ppo", PRIMARY, base=EQUAL, seeds=MORE_SEEDS)),
+        "C": _by_robot(_second("equal", "trpo", LAWS, policies=5, base=EQUAL)),
+        "D": _by_robot(_second("as-they-come", "ppo", [("gaussian", FREE)], policies=5)),
+        **{block: _by_robot(cells) for block, cells in zip("EF", _noise_and_steps(), strict=True)},
+    }
+)
+"""The second study's blocks (`results/PROTOCOL-2.md`), in the order in which they run."""
+
+
+def second_cells() -> tuple[Cell, ...]:
+    """Return all cells of the second study, in the order in which they run.
+
+    Example:
+        >>> len(second_cells()), {cell.version for cell in second_cells()}
+        (108, {2})
+    """
+    return tuple(cell for cells in SECOND.values() for cell in cells)
+
+
 def study_cells() -> tuple[Cell, ...]:
     """Return all cells of the protocol, in the order in which they run.
 
@@ -235,21 +178,21 @@ def study_cells() -> tuple[Cell, ...]:
 
 
 def all_cells() -> tuple[Cell, ...]:
-    """Return the protocol's cells and those that were asked for afterwards.
+    """Return the cells of both protocols and those that were asked for afterwards.
 
     Example:
-        >>> len(all_cells()) - len(study_cells())
+        >>> len(all_cells()) - len(study_cells()) - len(second_cells())
         7
     """
-    return (*study_cells(), *AFTERWARDS)
+    return (*study_cells(), *AFTERWARDS, *second_cells())
 
 
 def select(patterns: Sequence[str] = (), cells: Sequence[Cell] | None = None) -> tuple[Cell, ...]:
     """Return the cells whose id matches one of some patterns, in the study's order.
 
     Args:
-        patterns: ids, arms, or patterns with * and ?; none of them selects all of the protocol.
-        cells: to choose from; None is the protocol's and those of `AFTERWARDS`.
+        patterns: ids, arms, or patterns with * and ?; none of them selects all of the first protocol.
+        cells: to choose from; None is both protocols' and those of `AFTERWARDS`.
 
     Raises:
         ValueError: a pattern matches nothing.

@@ -28,7 +28,7 @@ from inbounds.learning.storage.run_metadata import METADATA_KEY, metadata_of
 from inbounds.learning.storage.run_store import COLUMNS as OF_A_RUN
 from inbounds.learning.storage.stored_config import changed_fields
 from inbounds.learning.storage.whole_files import DamagedFileError, damaged, file_lock, write_whole
-from inbounds.study.grid import STUDY_VERSION, Cell, digest_of
+from inbounds.study.cell import Cell, digest_of
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
@@ -177,8 +177,8 @@ class StudyFolder:
 
 
 def is_of(cell: Cell, metadata: Mapping[str, Any]) -> bool:
-    """Whether a file that says so much of itself is of a cell, of this version of the study."""
-    return metadata["study_version"] == STUDY_VERSION and not changed_fields(cell.config, metadata["config"])
+    """Return whether a file that says so much of itself is of a cell, in the version of its study."""
+    return metadata["study_version"] == cell.version and not changed_fields(cell.config, metadata["config"])
 
 
 def sha256(path: Path) -> str:
@@ -230,7 +230,7 @@ def table_of(
 def cell_metadata(cell: Cell, config: TrainConfig, **more: Any) -> str:
     """Return what a cell's file says of itself, as JSON: its configuration, its name, versions, and more."""
     cell_fields = ("arm", "algorithm", "family", "robot", "variant", "preset")
-    about = {"study_version": STUDY_VERSION, "id": cell.id, "digest": digest_of(config)}
+    about = {"study_version": cell.version, "id": cell.id, "digest": digest_of(config, cell.version)}
     about |= {name: getattr(cell, name) for name in cell_fields}
     return json.dumps(json.loads(metadata_of(config)) | about | more)
 

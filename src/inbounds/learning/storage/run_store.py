@@ -8,6 +8,7 @@ checksums, so that damage is noticed.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -31,6 +32,7 @@ from inbounds.learning.storage.whole_files import damaged, find, write_whole
 CHECKPOINT_FILE = checkpoint.FILE_NAME
 CURVES_FILE = "curves.parquet"
 POLICIES_FILE = "policies.safetensors"
+OF_THE_BOX = ("action.low", "action.high")  # the tensors that all seeds share
 
 COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {
     "epoch": (pa.int32(), "0, 1, …: rollouts, each followed by one update"),
@@ -158,15 +160,23 @@ def policies_of(trainer: Run) -> list[TrainedPolicy]:
     return trainer.policies
 
 
-def save_policies(path: str | Path, trainer: Run) -> None:
-    """Write the policies of all seeds of a run to a safetensors file, under the names of `Trainer.tensors`.
+def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = None) -> None:
+    """Write the policies of a run to a safetensors file, under the names of `Trainer.tensors`.
 
     Args:
         path: of the file; its folder must exist.
         trainer: the run.
+        seeds: whose policies; None is all of the run.
+
+    Raises:
+        ValueError: the run has no such seed.
     """
-    tensors = trainer.tensors()
-    metadata = metadata_of(trainer.config, sha256=_digest(tensors))
+    config, tensors = trainer.config, trainer.tensors()
+    if seeds is not None:
+        rows = [config.seeds.index(seed) for seed in seeds]
+        config = dataclasses.replace(config, seeds=tuple(seeds))
+        tensors = {n: t if n in OF_THE_BOX else t[rows] for n, t in tensors.items()}
+    metadata = metadata_of(config, sha256=_digest(tensors))
     write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
 
 

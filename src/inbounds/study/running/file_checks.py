@@ -6,6 +6,7 @@ where nothing is.
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +89,10 @@ def wrong_policies(cell: Cell, path: Path) -> str:
         policies = load_policies(path)
     except (ValueError, KeyError, IndexError, RuntimeError) as error:
         return str(error).partition(": ")[0]
-    if different := changed_fields(cell.config, describe(policies[0].config)):
+    kept = (
+        cell.config if cell.keeps_seeds is None else dataclasses.replace(cell.config, seeds=cell.keeps_seeds)
+    )
+    if different := changed_fields(kept, describe(policies[0].config)):
         name, (there, here) = next(iter(different.items()))
         return f"these are policies of another configuration ({name} is {there!r} instead of {here!r})"
     return ""

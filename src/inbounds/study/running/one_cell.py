@@ -23,7 +23,7 @@ from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import load_checkpoint, save_policies
 from inbounds.learning.storage.whole_files import DamagedFileError, is_disk_full
 from inbounds.study import store
-from inbounds.study.grid import STUDY_VERSION, Cell
+from inbounds.study.grid import Cell
 from inbounds.study.running.cell_lock import CellLock
 from inbounds.study.running.evaluate import GREEDY, evaluate_finally
 from inbounds.study.running.measure import MeasuredTrainer
@@ -100,7 +100,7 @@ def _is_finished(cell: Cell, folder: StudyFolder) -> bool:
         )
     if state == "another configuration":
         raise StudyError(
-            f"{path} is the result of another configuration or study version than {STUDY_VERSION}: "
+            f"{path} is the result of another configuration or study version than {cell.version}: "
             "use another --results folder, or move it away; one study never mixes two"
         )
     return state == "finished"
@@ -201,7 +201,7 @@ class _CellRun:
         contents: dict[Path, Any] = {}
         policies, returns = folder.policy_files(cell)
         temporary = self.work / policies.name
-        save_policies(temporary, run.trainer)
+        save_policies(temporary, run.trainer, cell.keeps_seeds)
         if cell.keeps_policies:
             start = time.perf_counter()
             rows = evaluate_finally(run.trainer)

@@ -1,0 +1,24 @@
+"""The second study: equal start, a practitioner's Gaussian, fresh seeds. `results/PROTOCOL-2.md` fixed it beforehand.
+
+outcomes = Outcomes.read(StudyFolder(), second_cells())
+rows = primary(outcomes)
+"""
+
+from inbounds.study.second.primary import GAUSSIAN, PrimaryRow, primary
+from inbounds.study.second.secondary import PAIRS, SecondaryRow, engines_agree, secondary, starts
+from inbounds.study.second.yardsticks import BEST, DO_NOTHING, MARGINS, normalized
+
+__all__ = [
+    "BEST",
+    "DO_NOTHING",
+    "GAUSSIAN",
+    "MARGINS",
+    "PAIRS",
+    "PrimaryRow",
+    "SecondaryRow",
+    "engines_agree",
+    "normalized",
+    "primary",
+    "secondary",
+    "starts",
+]

@@ -1,0 +1,159 @@
+"""The primary comparison: under PPO, from equal noise, does a bounded law end higher than a Gaussian with a free σ?
+
+Two laws × two endpoints × six robots are 24 tests, one family for Holm. A verdict is given where all twenty seeds of
+both sides are there; before that a row has its estimate and no verdict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from inbounds.study import statistics
+from inbounds.study.analysis import generator_for, marked
+from inbounds.study.cell import ROBOTS, SECOND_VERSION
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second.pooled import is_whole, pooled, pooled_scores
+from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
+from inbounds.study.statistics import Estimate
+from inbounds.study.statistics.settings import LEVEL
+
+RESAMPLES = 100_000
+PERMUTATIONS = 99_999
+BOUNDED = ("logit-normal", "beta")
+"""The laws that are compared with the Gaussian."""
+GAUSSIAN = Column("equal", "ppo", "gaussian", "free-std")
+
+Finding = Literal["confirmed", "contradicted", "refuted", "undecided", ""]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """First minus second on one robot and endpoint; None and NaN where a cell is missing.
+
+    Made by `gap`.
+    """
+
+    difference: Estimate | None
+    """Of the means."""
+    p_value: float
+    """Of equal means, by `permutation_test`."""
+
+
+@dataclass(frozen=True)
+class PrimaryRow:
+    """One of the 24 tests.
+
+    Made by `primary`, which has an example.
+    """
+
+    law: str
+    """The bounded one."""
+    endpoint: str
+    """final or area."""
+    robot: str
+    """A robot of `ROBOTS`."""
+    difference: Estimate | None
+    """Bounded law minus Gaussian with a free σ."""
+    p_value: float
+    """Of equal means."""
+    p_adjusted: float
+    """The same after Holm's correction over all 24."""
+    margin: float
+    """Below which a difference does not matter."""
+    whole: bool
+    """Whether all planned seeds of both sides are there."""
+
+    @property
+    def finding(self) -> Finding:
+        """What the protocol calls it; empty while seeds are missing."""
+        if self.difference is None or not self.whole:
+            return ""
+        return finding(self.difference, self.p_adjusted, self.margin)
+
+
+def finding(difference: Estimate, p_adjusted: float, margin: float) -> Finding:
+    """Return what a difference says to the hypothesis that the first side ends higher.
+
+    Args:
+        difference: first minus second.
+        p_adjusted: after the correction that the protocol names.
+        margin: below which a difference does not matter.
+
+    Returns:
+        refuted: the whole interval lies within the margin. Else confirmed or contradicted: it is found after
+        correction, in the direction expected or in the other. Else undecided.
+
+    Example:
+        >>> import numpy as np
+        >>> gap = Estimate(np.array(5.0), np.array(2.0), np.array(8.0), 20, 0, 0.95, "mean")
+        >>> finding(gap, 0.01, margin=3), finding(gap, 0.2, margin=3), finding(gap, 0.01, margin=9)
+        ('confirmed', 'undecided', 'refuted')
+    """
+    if -margin < difference.low and difference.high < margin:
+        return "refuted"
+    if p_adjusted < 1 - LEVEL:
+        return "confirmed" if difference.value > 0 else "contradicted"
+    return "undecided"
+
+
+def gap(
+    outcomes: Outcomes,
+    first: Column,
+    second: Column,
+    robot: str,
+    endpoint: str,
+    *,
+    without_diverged: bool = False,
+) -> Gap:
+    """Compare two columns on a robot, with all finished seeds of each."""
+    a, b = (
+        pooled_scores(outcomes, column, robot, endpoint, without_diverged=without_diverged)
+        for column in (first, second)
+    )
+    if a is None or b is None:
+        return Gap(None, float("nan"))
+    rng = generator_for("gap", *first, *second, robot, endpoint, without_diverged, version=SECOND_VERSION)
+    estimate = statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")
+    p_value = statistics.permutation_test(a, b, rng, permutations=PERMUTATIONS, missing="exclude")
+    if not without_diverged:
+        cells = [cell for column in (first, second) for cell in pooled(outcomes, column, robot)]
+        estimate = marked(estimate, *cells)
+    return Gap(estimate, p_value)
+
+
+def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[PrimaryRow]:
+    """Return the 24 rows of the primary comparison, in the order law, endpoint, robot.
+
+    Args:
+        outcomes: of the second study, as far as it has come.
+        without_diverged: leave out seeds that diverged.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> rows = primary(Outcomes.read(StudyFolder(Path("no/results"))))
+        >>> len(rows), {row.finding for row in rows}
+        (24, {''})
+    """
+    places = [(law, endpoint, robot) for law in BOUNDED for endpoint in ENDPOINTS for robot in ROBOTS]
+    gaps = [
+        gap(outcomes, _column(law), GAUSSIAN, robot, endpoint, without_diverged=without_diverged)
+        for law, endpoint, robot in places
+    ]
+    adjusted = statistics.holm([each.p_value for each in gaps])
+    return [
+        PrimaryRow(
+            *place,
+            each.difference,
+            each.p_value,
+            float(p),
+            MARGINS[place[1]][place[2]],
+            all(is_whole(outcomes, column, place[2]) for column in (_column(place[0]), GAUSSIAN)),
+        )
+        for place, each, p in zip(places, gaps, adjusted, strict=True)
+    ]
+
+
+def _column(law: str) -> Column:
+    return Column("equal", "ppo", law)
