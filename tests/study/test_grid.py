@@ -9,14 +9,14 @@ import pytest
 from inbounds.learning import preset
 from inbounds.learning.storage import stored_config
 from inbounds.learning.storage.stored_config import describe
+from inbounds.study.cell import LEARNING_RATES, NOISES, VARIANTS, digest_of
 from inbounds.study.grid import (
     AFTERWARDS,
     ARMS,
     ROBOTS,
-    VARIANTS,
     Cell,
     all_cells,
-    digest_of,
+    second_cells,
     select,
     study_cells,
 )
@@ -24,6 +24,8 @@ from inbounds.study.ledger import CLAIMS
 from inbounds.study.statistics import settings
 
 PROTOCOL = Path(__file__).parents[2] / "results" / "PROTOCOL.md"
+FIRST_STUDY = (*study_cells(), *AFTERWARDS)
+OF_THE_SECOND = {"free-std", *(f"noise-{s:g}" for s in NOISES), *(f"rate-{r:g}" for r in LEARNING_RATES)}
 
 
 def differences(a: Cell, b: Cell) -> set[str]:
@@ -44,8 +46,9 @@ def test_the_arms_are_those_of_the_protocol() -> None:
 
 
 def test_cells_of_later_are_told_apart_from_the_protocols() -> None:
-    assert all_cells() == (*study_cells(), *AFTERWARDS)
-    assert {cell.arm for cell in AFTERWARDS}.isdisjoint(ARMS)
+    assert all_cells() == (*FIRST_STUDY, *second_cells())
+    assert {cell.arm for cell in (*AFTERWARDS, *second_cells())}.isdisjoint(ARMS)
+    assert {cell.arm for cell in AFTERWARDS}.isdisjoint(cell.arm for cell in second_cells())
     assert select() == study_cells()
     assert select(["afterwards"]) == AFTERWARDS
     assert not any(set(AFTERWARDS) & set(select(claim.cells)) for claim in CLAIMS if claim.cells)
@@ -64,7 +67,7 @@ def test_the_variants_are_those_of_the_protocol() -> None:
         assert sum(cell.variant in variants for cell in ARMS["mechanisms"]) == int(cells[5])
         named |= dict.fromkeys(variants)
     asked_later = {cell.variant for cell in AFTERWARDS}
-    assert named.keys() | asked_later == VARIANTS.keys() - {""}
+    assert named.keys() | asked_later == VARIANTS.keys() - OF_THE_SECOND - {""}
 
 
 def test_the_numbers_of_the_analysis_are_those_of_the_protocol() -> None:
@@ -106,6 +109,8 @@ def test_every_cell_has_the_full_length() -> None:
     for cell in all_cells():
         assert cell.config.epochs == 500
         assert cell.config.algorithm.horizon == 2048
+    for cell in FIRST_STUDY:
+        assert (cell.engine, cell.version, cell.base) == ("autograd", 1, ())
         assert cell.config.seeds == tuple(range(10))
         looked_into = cell.variant in ("matched-noise", "gamma-0.9999")
         assert cell.keeps_policies == (looked_into or cell.arm in ("standard", "beyond", "afterwards"))
@@ -132,7 +137,7 @@ def test_printed_cells_are_the_preset() -> None:
         assert cell.config == preset("as-printed", cell.config.env, policy=cell.family, algo=cell.algorithm)
 
 
-@pytest.mark.parametrize("variant", sorted(VARIANTS.keys() - {""}))
+@pytest.mark.parametrize("variant", sorted(VARIANTS.keys() - OF_THE_SECOND - {""}))
 def test_a_variant_changes_one_thing(variant: str) -> None:
     changed = {
         "matched-noise": "policy.initial_std",
@@ -145,7 +150,7 @@ def test_a_variant_changes_one_thing(variant: str) -> None:
         "printed-gradients": "algorithm.max_grad_norm",
         "printed-weights": "network.initialization",
     }.get(variant, "algorithm.entropy_coef")
-    for cell in [cell for cell in all_cells() if cell.variant == variant]:
+    for cell in [cell for cell in FIRST_STUDY if cell.variant == variant]:
         plain = Cell("standard", cell.algorithm, cell.family, cell.robot)
         assert differences(cell, plain) == {changed}
 

@@ -1,0 +1,150 @@
+"""The second study's yardsticks and verdicts; `test_independent` repeats its numbers by other means."""
+
+import re
+
+import numpy as np
+import pytest
+
+from inbounds import robots
+from inbounds.study import StudyFolder, second
+from inbounds.study.analysis import scores
+from inbounds.study.grid import AFTERWARDS, ROBOTS, SECOND, all_cells, second_cells, study_cells
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.running.evaluate import play
+from inbounds.study.second.pooled import is_whole, pooled_scores
+from inbounds.study.second.primary import BOUNDED, PERMUTATIONS, RESAMPLES, finding
+from inbounds.study.second.secondary import PAIRS, TWINS
+from inbounds.study.second.yardsticks import UNTRAINED
+from inbounds.study.statistics import Estimate, smallest_detectable_effect
+from tests.study.second.test_cells import TEXT
+from tests.study.small import folder_in
+from tests.study.synthetic import write_cells
+from tests.study.test_grid import differences
+
+
+def test_the_yardsticks_are_those_of_the_protocol() -> None:
+    table = TEXT.partition("| Robot | doing nothing |")[2].partition("\n\n")[0]
+    for line in table.splitlines()[2:]:
+        robot, *numbers = (part.strip().replace("−", "-") for part in line.strip("|").split("|"))
+        assert [float(x) for x in numbers] == [
+            second.DO_NOTHING[robot],
+            UNTRAINED[robot],
+            second.BEST["final"][robot],
+            second.BEST["area"][robot],
+            second.MARGINS["final"][robot],
+            second.MARGINS["area"][robot],
+        ]
+    assert f"**{RESAMPLES:,}** resamples".replace(",", " ") in TEXT
+    assert f"**{PERMUTATIONS:,}** permutations".replace(",", " ") in TEXT
+
+
+def test_the_yardsticks_come_from_the_first_study() -> None:
+    first = Outcomes.read(StudyFolder.shipped(), (*study_cells(), *AFTERWARDS))
+    for robot in ROBOTS:
+        standard = [o for o in first.finished.values() if o.cell.arm == "standard" and o.cell.robot == robot]
+        assert len(standard) == 5
+        for endpoint, best in second.BEST.items():
+            assert best[robot] == pytest.approx(max(scores(o, endpoint).mean() for o in standard), abs=0.005)
+        (quiet,) = [
+            o
+            for o in first.finished.values()
+            if (o.cell.robot, o.cell.algorithm, o.cell.family, o.cell.variant)
+            == (robot, "ppo", "gaussian", "matched-noise")
+        ]
+        assert UNTRAINED[robot] == pytest.approx(quiet.returns[:, 0].mean(), abs=0.005)
+        for endpoint, margin in second.MARGINS.items():
+            fifth = (second.BEST[endpoint][robot] - UNTRAINED[robot]) / 5
+            assert margin[robot] == pytest.approx(fifth, rel=0.015)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_doing_nothing(robot: str) -> None:
+    """Ten of the hundred episodes: their mean is near that of all, by the spread between episodes."""
+    envs = robots.make(f"{robot}-v5", 10)
+    still = np.zeros((10, *envs.single_action_space.shape), envs.single_action_space.dtype)
+    returns, _ = play(envs, lambda obs: still, range(10))
+    envs.close()
+    spread = {"Swimmer": 21.0, "Hopper": 38.0, "Walker2d": 9.5, "Humanoid": 3.2}.get(robot, 5.0)
+    assert returns.mean() == pytest.approx(second.DO_NOTHING[robot], abs=3.5 * spread / np.sqrt(10))
+
+
+def test_what_ten_and_twenty_seeds_find() -> None:
+    for n, said in ((10, "2.05"), (20, "1.33")):
+        effect = smallest_detectable_effect(n, np.random.default_rng(0), tests=24, trials=100_000)
+        assert effect == pytest.approx(float(said), abs=0.01)
+        assert said in TEXT
+
+
+def estimate(value: float, half: float) -> Estimate:
+    return Estimate(np.array(value), np.array(value - half), np.array(value + half), 20, 0, 0.95, "mean")
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "p", "word"),
+    [
+        (5.0, 1.0, 0.001, "confirmed"),
+        (-5.0, 1.0, 0.001, "contradicted"),
+        (5.0, 1.0, 0.051, "undecided"),
+        (0.0, 1.9, 0.9, "refuted"),
+        (0.5, 1.0, 0.001, "refuted"),  # found, and too small to matter
+        (0.0, 2.1, 0.9, "undecided"),  # contains 0, and does not lie within the margin
+        (-1.5, 0.6, 0.9, "undecided"),
+    ],
+)
+def test_findings(value: float, half: float, p: float, word: str) -> None:
+    assert finding(estimate(value, half), p, margin=2.0) == word
+
+
+def test_a_verdict_waits_for_all_twenty_seeds(tmp_path) -> None:
+    folder = folder_in(tmp_path)
+    ten = [c for c in SECOND["B"] if c.robot == "Hopper"]
+    write_cells(folder, ten)
+    outcomes = Outcomes.read(folder, second_cells())
+    rows = [row for row in second.primary(outcomes) if row.robot == "Hopper"]
+    assert all(row.difference.n == 10 and not row.finding for row in rows)
+    write_cells(folder, [c for c in SECOND["B, more seeds"] if c.robot == "Hopper"])
+    outcomes = Outcomes.read(folder, second_cells())
+    rows = second.primary(outcomes)
+    here = [row for row in rows if row.robot == "Hopper"]
+    assert all(row.difference.n == 20 and row.finding for row in here)
+    assert all(row.difference is None and not row.finding for row in rows if row.robot != "Hopper")
+    assert min(row.p_adjusted for row in here) >= 24 / (PERMUTATIONS + 1) * 0.99  # all 24 keep their place
+    column = Column("equal", "ppo", "beta")
+    assert pooled_scores(outcomes, column, "Hopper", "final").shape == (20,)
+    assert is_whole(outcomes, column, "Hopper")
+    assert not is_whole(outcomes, column, "Ant")
+    assert is_whole(
+        outcomes, Column("equal", "ppo", "logit-normal", "free-std"), "Hopper"
+    )  # ten were planned
+
+
+def test_doing_nothing_scores_nought(tmp_path) -> None:
+    folder = folder_in(tmp_path)
+    column = Column("equal", "ppo", "beta")
+    write_cells(folder, [c for c in SECOND["B"] if c.family == "beta"])
+    found = second.normalized(Outcomes.read(folder, second_cells()), column, "final")
+    raw = pooled_scores(Outcomes.read(folder, second_cells()), column, "Ant", "final")
+    assert found is not None
+    assert found["Ant"] == pytest.approx((raw - 994.07) / (1335.21 - 994.07))
+
+
+def test_the_secondary_questions_are_those_of_the_protocol() -> None:
+    table = TEXT.partition("| Question |")[2].partition("\n\n")[0]
+    said = {line.split("|")[1].strip() for line in table.splitlines()[2:]}
+    assert said == set(PAIRS)
+    planned = {(c.arm, c.algorithm, c.family, c.variant, c.robot) for c in second_cells()}
+    for pairs in PAIRS.values():
+        for pair in pairs:
+            for column in (pair.first, pair.second):
+                assert all((*column, robot) in planned for robot in pair.robots)
+
+
+def test_twins_differ_by_engine_and_seeds_alone() -> None:
+    by_column = {(c.arm, c.algorithm, c.family, c.variant, c.robot): c for c in all_cells()}
+    for ours, theirs, robot in TWINS:
+        assert differences(by_column[(*ours, robot)], by_column[(*theirs, robot)]) == {"seeds", "engine"}
+
+
+def test_the_protocol_names_its_hypotheses() -> None:
+    assert re.findall(r"\*\*H-([\w-]+)\*\*: the", TEXT) == ["logit-normal", "Beta"]
+    assert BOUNDED == ("logit-normal", "beta")

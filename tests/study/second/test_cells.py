@@ -1,0 +1,103 @@
+"""The second study's cells are those of `results/PROTOCOL-2.md`."""
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inbounds.learning import FAMILIES, load_policies
+from inbounds.learning.families import head_bias
+from inbounds.study import Cell, run_cell
+from inbounds.study.grid import ROBOTS, SECOND, second_cells, select
+from inbounds.study.running import file_checks
+from tests.study.small import folder_in, small_cell
+from tests.study.test_grid import PROTOCOL, differences
+
+TEXT = (PROTOCOL.parent / "PROTOCOL-2.md").read_text(encoding="utf8")
+ROWS = {
+    line.split("|")[1].strip(): [part.strip() for part in line.strip("|").split("|")]
+    for line in TEXT.partition("| Block |")[2].partition("\n\n")[0].splitlines()[2:]
+}
+NAMES = {"Gaussian free σ": ("gaussian", False), "Gaussian σ(s)": ("gaussian", True)}
+NAMES |= {"logit-normal free σ": ("logit-normal", False), "logit-normal": ("logit-normal", True)}
+NAMES |= {"Beta": ("beta", True)}
+
+
+def test_the_blocks_are_those_of_the_protocol() -> None:
+    assert list(SECOND) == list(ROWS)
+    for block, (_, arm, columns, robots, seeds, count) in ROWS.items():
+        cells = SECOND[block]
+        assert {cell.arm for cell in cells} == {arm.strip("`")}
+        assert len(cells) == int(count)
+        first, last = map(int, seeds.split("–"))
+        assert {cell.seeds for cell in cells} == {tuple(range(first, last + 1))}
+        algorithm, _, named = columns.partition(" × ")
+        assert {cell.algorithm for cell in cells} == {algorithm.lower()}
+        found = {(cell.family, cell.config.policy.state_dependent_std) for cell in cells}
+        laws = named.strip("{").partition("}")[0] if "{" in named else named.partition(",")[0]
+        assert found == {NAMES[name.strip()] for name in laws.split(",")}
+        on = ROBOTS if robots == "all six" else tuple(robots.split(", "))
+        assert tuple(dict.fromkeys(cell.robot for cell in cells)) == on
+
+
+@pytest.mark.parametrize("cell", second_cells(), ids=lambda cell: cell.id)
+def test_a_cell_differs_from_common_in_what_its_block_says(cell: Cell) -> None:
+    plain = Cell("standard", cell.algorithm, cell.family, cell.robot)
+    expected = {"seeds", "engine"}
+    expected |= {"policy.initial_std"} if cell.arm != "as-they-come" else set()
+    expected |= {"policy.state_dependent_std"} if "free-std" in (cell.variant, *cell.base) else set()
+    expected |= {"algorithm.learning_rate"} if cell.arm == "steps" else set()
+    assert differences(cell, plain) == expected
+    assert (cell.config.engine, cell.version) == ("compiled", 2)
+
+
+@pytest.mark.parametrize("block", SECOND)
+def test_the_noise_can_be_had(block: str) -> None:
+    asked = {"B": {0.4}, "B, more seeds": {0.4}, "C": {0.4}, "D": {None}, "E": {0.2, 0.55}, "F": {0.4}}
+    assert {cell.config.policy.initial_std for cell in SECOND[block]} == asked[block]
+    for cell in SECOND[block]:
+        bias = head_bias(cell.config.policy)  # raises where no parameters give it
+        assert (bias is None) == (block == "D")
+    if block == "F":
+        assert {cell.config.algorithm.learning_rate for cell in SECOND[block]} == {1e-4, 1e-3}
+
+
+def test_no_beta_is_louder_than_the_uniform_law() -> None:
+    assert f"{FAMILIES['beta'].executed_std(1.0):.3f}" in TEXT
+
+
+def test_policies_are_kept_as_the_protocol_says() -> None:
+    said = "The final policies of B are kept, of C and D those of the first five seeds; on Humanoid of the first three"
+    assert said in TEXT
+    for block, kept in {"B": 10, "C": 5, "D": 5, "B, more seeds": 0, "E": 0, "F": 0}.items():
+        for cell in SECOND[block]:
+            if (cell.family, cell.variant) == ("logit-normal", "free-std"):
+                assert not cell.keeps_policies
+                continue
+            assert cell.keeps_policies == (kept > 0)
+            if kept:
+                assert cell.keeps_seeds == tuple(range(10, 10 + (3 if cell.robot == "Humanoid" else kept)))
+
+
+def test_arms_can_be_named() -> None:
+    assert {cell.arm for cell in select(["equal-more", "noise"])} == {"equal-more", "noise"}
+    assert all(re.fullmatch(r"[a-z0-9.-]+", cell.id) for cell in second_cells())
+
+
+def test_the_policies_of_some_seeds_alone_are_kept(tmp_path: Path) -> None:
+    whole = small_cell("ppo", "beta", seeds=(3, 4, 5), epochs=1, keeps_policies=True)
+    some = dataclasses.replace(whole, arm="some", keeps_seeds=(5, 3))
+    folder = folder_in(tmp_path)
+    assert run_cell(some, folder) == run_cell(whole, folder) == "finished"
+    kept, every = (load_policies(folder.policy_files(cell)[0]) for cell in (some, whole))
+    assert [policy.seed for policy in kept] == [5, 3]
+    assert not file_checks.wrong_policies(some, folder.policy_files(some)[0])
+    assert file_checks.wrong_policies(whole, folder.policy_files(some)[0])
+    obs = np.linspace(-1, 1, 8)  # of Swimmer
+    assert np.array_equal(kept[0].act(obs), every[2].act(obs))
+    assert np.array_equal(kept[1].act(obs), every[0].act(obs))
+    assert not np.array_equal(kept[0].act(obs), kept[1].act(obs))
+    with pytest.raises(ValueError, match="not in"):
+        run_cell(dataclasses.replace(whole, arm="none", keeps_seeds=(9,)), folder)
