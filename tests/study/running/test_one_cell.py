@@ -2,6 +2,7 @@ import errno
 import warnings
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import load_policies, policies_of
 from inbounds.learning.training import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, read_cell, run_cell
-from inbounds.study.running import evaluate, one_cell
+from inbounds.study.running import evaluate, file_checks, one_cell
 from inbounds.study.running.cell_lock import CellLock, ClaimedError
 from inbounds.study.running.evaluate import generator_of
 from inbounds.study.running.measure import MeasuredTrainer
@@ -367,3 +368,20 @@ def test_rows_end_with_the_epoch_in_which_a_seed_diverged() -> None:
     assert table["episodes"].to_pylist() == [2, 2, 2, 2, 2, 0]
     assert np.isnan(table["kl"].to_pylist()[-1])
     assert table["evaluation_seconds"].to_pylist()[-1] == 1
+
+
+def test_the_policies_of_some_seeds_alone_are_kept(tmp_path: Path) -> None:
+    whole = small_cell("ppo", "beta", seeds=(3, 4, 5), epochs=1, keeps_policies=True)
+    some = replace(whole, arm="some", keeps_seeds=(5, 3))
+    folder = folder_in(tmp_path)
+    assert run_cell(some, folder) == run_cell(whole, folder) == "finished"
+    kept, every = (load_policies(folder.policy_files(cell)[0]) for cell in (some, whole))
+    assert [policy.seed for policy in kept] == [5, 3]
+    assert not file_checks.wrong_policies(some, folder.policy_files(some)[0])
+    assert file_checks.wrong_policies(whole, folder.policy_files(some)[0])
+    obs = np.linspace(-1, 1, 8)  # of Swimmer
+    assert np.array_equal(kept[0].act(obs), every[2].act(obs))
+    assert np.array_equal(kept[1].act(obs), every[0].act(obs))
+    assert not np.array_equal(kept[0].act(obs), kept[1].act(obs))
+    with pytest.raises(ValueError, match="not in"):
+        run_cell(replace(whole, arm="none", keeps_seeds=(9,)), folder)

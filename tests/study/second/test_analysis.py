@@ -54,7 +54,7 @@ def test_the_yardsticks_come_from_the_first_study() -> None:
         assert UNTRAINED[robot] == pytest.approx(quiet.returns[:, 0].mean(), abs=0.005)
         for endpoint, margin in second.MARGINS.items():
             fifth = (second.BEST[endpoint][robot] - UNTRAINED[robot]) / 5
-            assert margin[robot] == pytest.approx(fifth, rel=0.015)
+            assert margin[robot] == pytest.approx(fifth, rel=0.025)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -1,18 +1,13 @@
 """The second study's cells are those of `results/PROTOCOL-2.md`."""
 
-import dataclasses
 import re
-from pathlib import Path
 
-import numpy as np
 import pytest
 
-from inbounds.learning import FAMILIES, load_policies
+from inbounds.learning import FAMILIES
 from inbounds.learning.families import head_bias
-from inbounds.study import Cell, run_cell
+from inbounds.study import Cell
 from inbounds.study.grid import ROBOTS, SECOND, second_cells, select
-from inbounds.study.running import file_checks
-from tests.study.small import folder_in, small_cell
 from tests.study.test_grid import PROTOCOL, differences
 
 TEXT = (PROTOCOL.parent / "PROTOCOL-2.md").read_text(encoding="utf8")
@@ -84,20 +79,3 @@ def test_policies_are_kept_as_the_protocol_says() -> None:
 def test_arms_can_be_named() -> None:
     assert {cell.arm for cell in select(["equal-more", "noise"])} == {"equal-more", "noise"}
     assert all(re.fullmatch(r"[a-z0-9.-]+", cell.id) for cell in second_cells())
-
-
-def test_the_policies_of_some_seeds_alone_are_kept(tmp_path: Path) -> None:
-    whole = small_cell("ppo", "beta", seeds=(3, 4, 5), epochs=1, keeps_policies=True)
-    some = dataclasses.replace(whole, arm="some", keeps_seeds=(5, 3))
-    folder = folder_in(tmp_path)
-    assert run_cell(some, folder) == run_cell(whole, folder) == "finished"
-    kept, every = (load_policies(folder.policy_files(cell)[0]) for cell in (some, whole))
-    assert [policy.seed for policy in kept] == [5, 3]
-    assert not file_checks.wrong_policies(some, folder.policy_files(some)[0])
-    assert file_checks.wrong_policies(whole, folder.policy_files(some)[0])
-    obs = np.linspace(-1, 1, 8)  # of Swimmer
-    assert np.array_equal(kept[0].act(obs), every[2].act(obs))
-    assert np.array_equal(kept[1].act(obs), every[0].act(obs))
-    assert not np.array_equal(kept[0].act(obs), kept[1].act(obs))
-    with pytest.raises(ValueError, match="not in"):
-        run_cell(dataclasses.replace(whole, arm="none", keeps_seeds=(9,)), folder)
