@@ -16,9 +16,10 @@ from inbounds.book.report.changes import GROUPS, afterwards, changes
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.ledger_table import findings, ledger
 from inbounds.book.report.over_all_robots import over_all_robots
+from inbounds.book.report.second_study import second_study
 from inbounds.book.report.words import ALGORITHMS, ARM_NAMES, ARM_TITLES, title_of
 from inbounds.learning.storage.whole_files import write_whole
-from inbounds.study.grid import ARMS, ROBOTS, STUDY_VERSION
+from inbounds.study.grid import ARMS, ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics.settings import LEVEL, RESAMPLES
 from inbounds.study.words import percent
@@ -66,6 +67,7 @@ def _body(outcomes: Outcomes) -> Iterator[str]:
         "state": "What there is",
         **ARM_TITLES,
         "afterwards": "Asked afterwards",
+        "second": "The second study",
         "claims": "Claims of the source thesis",
         "provenance": "Provenance",
     }
@@ -74,7 +76,7 @@ def _body(outcomes: Outcomes) -> Iterator[str]:
         return html.heading(sections[anchor], 2, anchor)
 
     finished = f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
-    yield html.paragraph(f"Study version {STUDY_VERSION}. {finished}")
+    yield html.paragraph(f"{finished} The second study is counted in its own section.")
     yield html.contents(sections.items())
     yield html.heading("How to read it", 3)
     yield html.bullets(HOW_TO_READ)
@@ -89,6 +91,8 @@ def _body(outcomes: Outcomes) -> Iterator[str]:
         "results/AFTERWARDS.md says why each was added, and what was expected."
     )
     yield from afterwards(outcomes).parts
+    yield heading("second")
+    yield from second_study(outcomes)
     yield heading("claims")
     yield from ledger(findings(outcomes)).parts
     yield heading("provenance")

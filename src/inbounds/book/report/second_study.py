@@ -1,0 +1,245 @@
+"""The second study's views: an equal start, a Gaussian with a free σ, fresh seeds (`results/PROTOCOL-2.md`).
+
+Each reads the cells of the second study from wherever the first study's outcomes came from.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from inbounds.book.drawing.figures import LOOKS, WIDTH, use_style
+from inbounds.book.report import html
+from inbounds.book.report.html import NONE_FINISHED, Shown
+from inbounds.book.report.study_figures import SHORT
+from inbounds.study.grid import ROBOTS, SECOND, second_cells
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second import PrimaryRow, engines_agree, primary, secondary, starts
+from inbounds.study.second.primary import BOUNDED
+from inbounds.study.second.yardsticks import ENDPOINTS
+from inbounds.study.words import p_value, percent, spoken, verdict
+
+BLOCKS = {
+    "B": "B: equal start, PPO",
+    "B, more seeds": "B: ten more seeds of the primary columns",
+    "C": "C: equal start, TRPO",
+    "D": "D: the Gaussian with a free σ as it comes",
+    "E": "E: other noise",
+    "F": "F: other step sizes",
+}
+"""Block → what it is called."""
+TOLERANCE = 0.02  # of the executed noise, before the start counts as unequal
+
+
+def column_name(column: Column) -> str:
+    """Return what a column is called within its arm.
+
+    Example:
+        >>> column_name(Column("equal", "ppo", "gaussian", "free-std"))
+        'Gaussian free σ'
+    """
+    free = column.variant == "free-std" or (column.arm == "steps" and column.family == "gaussian")
+    sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
+    changed = "" if column.variant in ("", "free-std") else f", {column.variant.replace('-', ' ', 1)}"
+    return f"{SHORT[column.family]}{sigma}{changed}"
+
+
+def progress(outcomes: Outcomes) -> Shown:
+    """Return how many cells of each block are finished."""
+    states = _second(outcomes).states
+    counts = {
+        BLOCKS[block]: (sum(states[cell.id] == "finished" for cell in cells), len(cells))
+        for block, cells in SECOND.items()
+    }
+    return html.of_study("the second study, finished cells", html.progress(counts))
+
+
+def primary_comparison(outcomes: Outcomes) -> Shown:
+    """Return the primary comparison: a forest of differences in units of the margin, and the 24 tests as a table."""
+    rows = primary(_second(outcomes))
+    known = [row for row in rows if row.difference is not None]
+    if not known:
+        return html.of_study("the primary comparison", NONE_FINISHED)
+    words = Counter(row.finding or "waits for seeds" for row in known)
+    alt = (
+        "Bounded law minus Gaussian with a free σ, in units of the margin, a row per robot, a panel per endpoint. "
+        + ". ".join(
+            f"{SHORT[row.law]}, {ENDPOINTS[row.endpoint]}, {row.robot}: {spoken(row.difference)}"
+            for row in known
+        )
+    )
+    head = ["robot", "law", "endpoint", "seeds", "difference", "margin", "p", "p, Holm over 24", "finding"]
+    table = [
+        [
+            row.robot,
+            SHORT[row.law],
+            ENDPOINTS[row.endpoint],
+            str(row.difference.n) if row.difference else "",
+            spoken(row.difference),
+            f"±{row.margin:g}",
+            p_value(row.p_value),
+            p_value(row.p_adjusted),
+            row.finding or ("missing" if row.difference is None else "waits for seeds"),
+        ]
+        for row in rows
+    ]
+    caption = (
+        "Primary comparison: bounded law minus Gaussian with a free σ, PPO, executed noise 0.4 at the start. "
+        "Refuted: the interval lies within the margin. A finding waits until twenty seeds a side are there. "
+        f"Of {len(rows)}: {', '.join(f'{count} {word}' for word, count in words.items())}."
+    )
+    return html.of_study(
+        "the primary comparison",
+        html.figure(forest(known), alt),
+        html.table(caption, head, table, words=(0, 1, 2, 8)),
+    )
+
+
+def forest(rows: Sequence[PrimaryRow]) -> Figure:
+    """Draw differences with their intervals in units of the margin, so that all robots share an axis.
+
+    Args:
+        rows: with a difference each.
+    """
+    robots = [robot for robot in ROBOTS if any(row.robot == robot for row in rows)]
+    with use_style():
+        fig, axes = plt.subplots(
+            1, len(ENDPOINTS), figsize=(WIDTH, 1.2 + 0.5 * len(robots)), sharey=True, squeeze=False
+        )
+        for ax, (endpoint, name) in zip(axes[0], ENDPOINTS.items(), strict=True):
+            ax.axvspan(-1, 1, color="#DFE3E8", alpha=0.6, linewidth=0)
+            ax.axvline(0, color="#5F6770", linewidth=1)
+            for row in (row for row in rows if row.endpoint == endpoint and row.difference is not None):
+                place = robots.index(row.robot) + 0.18 * (2 * BOUNDED.index(row.law) - 1)
+                look, gap = LOOKS[row.law], row.difference
+                assert gap is not None
+                low, value, high = (float(x) / row.margin for x in (gap.low, gap.value, gap.high))
+                ax.plot([low, high], [place, place], color=look.color, linewidth=2)
+                filled = look.color if row.whole else "none"
+                ax.plot(value, place, marker=look.marker, color=look.color, markerfacecolor=filled)
+            ax.set(title=name, xlabel="difference, in margins")
+            ax.set_yticks(np.arange(len(robots)), robots)
+        axes[0, 0].invert_yaxis()
+        handles = [
+            plt.Line2D(
+                [],
+                [],
+                color=LOOKS[law].color,
+                marker=LOOKS[law].marker,
+                label=f"{LOOKS[law].label} − Gaussian",
+            )
+            for law in BOUNDED
+        ]
+        fig.legend(handles=handles, loc="outside upper center", ncols=2)
+    return fig
+
+
+def equal_starts(outcomes: Outcomes) -> Shown:
+    """Return the manipulation check: what each column does before training, and whether the start is equal."""
+    found = _second(outcomes)
+    rows = []
+    for cell in second_cells():
+        column = Column(cell.arm, cell.algorithm, cell.family, cell.variant)
+        if (start := starts(found, column, cell.robot)) is None:
+            continue
+        asked = cell.config.policy.initial_std
+        failed = asked is not None and abs(start["action_std"] - asked) > TOLERANCE
+        rows.append(
+            [
+                cell.robot,
+                cell.arm,
+                cell.algorithm.upper(),
+                column_name(column),
+                f"{start['action_std']:.3f}",
+                "as it comes" if asked is None else f"{asked:g}{', failed' if failed else ''}",
+                percent(start["saturation"], 1),
+                f"{start['return']:.0f}".replace("-", "−"),
+            ]
+        )
+    if not rows:
+        return html.of_study("the manipulation check", NONE_FINISHED)
+    head = [
+        "robot",
+        "arm",
+        "algorithm",
+        "column",
+        "executed noise",
+        "asked for",
+        "at a bound",
+        "first return",
+    ]
+    caption = "Manipulation check: the untrained policies, means over seeds of the first epoch."
+    return html.of_study("the manipulation check", html.table(caption, head, rows, words=(0, 1, 2, 3)))
+
+
+def secondary_comparisons(outcomes: Outcomes) -> Shown:
+    """Return the secondary tests whose cells are finished, as a table."""
+    rows = [
+        [
+            row.question,
+            f"{row.pair.first.algorithm.upper()}: {column_name(row.pair.first)} − {column_name(row.pair.second)}",
+            row.robot,
+            ENDPOINTS[row.endpoint],
+            spoken(row.comparison.difference),
+            p_value(row.comparison.p_adjusted),
+            p_value(row.p_over_everything),
+            verdict(row.comparison),
+        ]
+        for row in secondary(_second(outcomes))
+        if row.comparison.difference is not None
+    ]
+    if not rows:
+        return html.of_study("the secondary comparisons", NONE_FINISHED)
+    head = ["question", "difference", "robot", "endpoint", "", "p, Holm over robots", "over everything", ""]
+    caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
+    return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 3, 7)))
+
+
+def engine_check(outcomes: Outcomes) -> Shown:
+    """Return whether the compiled engine's cells are equivalent to their twins of the first study."""
+    agreed = engines_agree(_second(outcomes))
+    if not agreed:
+        return html.of_study("the two engines", NONE_FINISHED)
+    rows = [
+        [
+            robot,
+            SHORT[family],
+            ENDPOINTS[endpoint],
+            f"{e.difference:.0f} [{e.low:.0f}, {e.high:.0f}]".replace("-", "−"),
+            p_value(e.p_value),
+            "equivalent" if e.equivalent else "undecided",
+        ]
+        for (family, robot, endpoint), e in agreed.items()
+    ]
+    caption = (
+        "Compiled minus autograd, PPO, equal start: two one-sided tests within the margins; 90 % intervals."
+    )
+    head = ["robot", "family", "endpoint", "difference", "p", ""]
+    return html.of_study("the two engines", html.table(caption, head, rows, words=(0, 1, 2, 5)))
+
+
+def second_study(outcomes: Outcomes) -> Iterator[str]:
+    """Yield the parts of the report's section."""
+    yield html.paragraph(
+        "Which law, all else equal? Every law starts with the same executed noise, the Gaussian has a free σ, the "
+        "seeds are fresh. results/PROTOCOL-2.md fixed it before its first run."
+    )
+    for title, view in (
+        ("Finished cells", progress),
+        ("Primary comparison", primary_comparison),
+        ("Before training", equal_starts),
+        ("The two engines", engine_check),
+        ("Secondary comparisons", secondary_comparisons),
+    ):
+        yield html.heading(title, 3)
+        yield from view(outcomes).parts
+
+
+def _second(outcomes: Outcomes) -> Outcomes:
+    """Return outcomes that know the second study's cells, too."""
+    known = {cell.id for cell in second_cells()} <= outcomes.states.keys()
+    return outcomes if known else outcomes.and_of(second_cells())

@@ -1,0 +1,90 @@
+"""The second study's views say what is there, wait where seeds are missing, and never call an open interval equal."""
+
+import re
+
+import pytest
+
+from inbounds.book.report import second_study as views
+from inbounds.study.grid import SECOND, second_cells
+from inbounds.study.outcomes import Column, Outcomes
+from tests.study.small import folder_in
+from tests.study.synthetic import write_cells
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
+    """All of B on two robots, ten seeds alone on a third."""
+    folder = folder_in(tmp_path_factory.mktemp("second"))
+    write_cells(folder, [c for c in SECOND["B"] if c.robot in ("Hopper", "Ant", "Swimmer")])
+    write_cells(folder, [c for c in SECOND["B, more seeds"] if c.robot in ("Hopper", "Ant")])
+    return Outcomes.read(folder)  # of the first study: the views read the second's
+
+
+def rows_of(shown: views.Shown) -> list[list[str]]:
+    rows = re.findall(r"<tr>(.*?)</tr>", shown.html, re.DOTALL)
+    return [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row, re.DOTALL) for row in rows]
+
+
+def test_nothing_is_called_missing(tmp_path) -> None:
+    nothing = Outcomes.read(folder_in(tmp_path))
+    for view in (
+        views.primary_comparison,
+        views.equal_starts,
+        views.secondary_comparisons,
+        views.engine_check,
+    ):
+        assert "missing" in view(nothing).html
+    assert "0 of 108" not in views.progress(nothing).html
+    assert all(f"0 of {len(cells)}" in views.progress(nothing).html for cells in SECOND.values())
+
+
+def test_the_primary_table(outcomes: Outcomes) -> None:
+    _, *rows = rows_of(views.primary_comparison(outcomes))
+    assert len(rows) == 24
+    by = {tuple(row[:3]): row for row in rows}
+    assert by["Ant", "Beta", "final return"][3] == "20"
+    assert by["Ant", "Beta", "final return"][-1] in ("confirmed", "contradicted", "refuted", "undecided")
+    assert by["Swimmer", "Beta", "final return"][3] == "10"
+    assert by["Swimmer", "Beta", "final return"][-1] == "waits for seeds"
+    assert by["Walker2d", "Beta", "final return"][-1] == "missing"
+
+
+def test_the_start_that_is_not_equal_is_called_failed(outcomes: Outcomes) -> None:
+    _, *rows = rows_of(views.equal_starts(outcomes))
+    assert len(rows) == 3 * 5 + 2 * 3
+    assert all(row[5].startswith("0.4") for row in rows)
+    for row in rows:  # made-up noise is anywhere between 0 and 1
+        assert row[5].endswith("failed") == (abs(float(row[4]) - 0.4) > views.TOLERANCE)
+    assert any(row[5].endswith("failed") for row in rows)
+
+
+def test_names_of_columns() -> None:
+    names = {
+        views.column_name(Column(c.arm, c.algorithm, c.family, c.variant))
+        for c in second_cells()
+        if c.arm in ("equal", "steps")
+    }
+    assert names == {
+        "Gaussian free σ",
+        "Gaussian σ(s)",
+        "Beta",
+        "Logit-normal",
+        "Logit-normal free σ",
+        *(
+            f"{law}, rate {r}"
+            for law in ("Gaussian free σ", "Beta", "Logit-normal")
+            for r in ("0.0001", "0.001")
+        ),
+    }
+
+
+def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> None:
+    _, *rows = rows_of(views.secondary_comparisons(outcomes))
+    assert {row[2] for row in rows} == {"Hopper", "Ant", "Swimmer"}
+    assert {row[0] for row in rows} == {
+        "law, σ of the state",
+        "law, σ free",
+        "σ free or of the state",
+        "the bounded laws",
+    }
+    assert {row[-1] for row in rows} <= {"higher", "lower", "unresolved", "not after Holm"}
