@@ -112,7 +112,7 @@ def _second(
     **values: Any,
 ) -> list[Cell]:
     """The cells of columns of the second study; the policies of so many seeds are kept, on Humanoid of three."""
-    common = {"seeds": FIRST_SEEDS, "engine": "compiled", "version": SECOND_VERSION} | values
+    common: dict[str, Any] = {"seeds": FIRST_SEEDS, "engine": "compiled", "version": SECOND_VERSION} | values
     return [
         Cell(
             arm,

@@ -125,8 +125,10 @@ def secondary(outcomes: Outcomes) -> list[SecondaryRow]:
                 ]
     everything = statistics.holm([each.p_value for *_, each, _ in found])
     return [
-        SecondaryRow(*place, Comparison(each.difference, each.p_value, p), float(over))
-        for (*place, each, p), over in zip(found, everything, strict=True)
+        SecondaryRow(
+            question, pair, endpoint, robot, Comparison(each.difference, each.p_value, p), float(over)
+        )
+        for (question, pair, endpoint, robot, each, p), over in zip(found, everything, strict=True)
     ]
 
 
