@@ -48,11 +48,11 @@ def test_every_column_means_what_the_table_of_columns_says() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("algorithm", "family"), columns(CELLS))
+@pytest.mark.parametrize(("algorithm", "family", "engine"), columns(CELLS))
 def test_the_engine_repeats_two_epochs(
-    algorithm: str, family: str, capsys: pytest.CaptureFixture[str]
+    algorithm: str, family: str, engine: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    finding = check_column(CELLS, RESULTS, algorithm, family, epochs=2)
+    finding = check_column(CELLS, RESULTS, algorithm, family, engine, epochs=2)
     with capsys.disabled():
         print(f"\n{finding.subject}: {finding.message}")
     assert finding.ok, (

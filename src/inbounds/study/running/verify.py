@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from inbounds.learning.storage.run_metadata import COMPILERS
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import store
 from inbounds.study.grid import Cell
@@ -30,7 +31,7 @@ TOLERANCE = 1e-3
 
 
 WHEELS = ("torch", "mujoco", "gymnasium", "numpy", "scipy")
-"""The packages whose versions decide the last bits of a result."""
+"""The packages whose versions decide the last bits of a result; with the compiled engine numba and llvmlite do, too."""
 NOTHING_TO_RERUN = "skipped: none of its cells is finished"
 
 
@@ -62,7 +63,7 @@ def verify(
         cells: of the study; those without results are passed over.
         folder: where the results are.
         epochs: to run again, of each chosen cell.
-        rerun: which cells; None is the first finished one of each algorithm × family, () none.
+        rerun: which cells; None is the first finished one of each algorithm × family × engine, () none.
         on_finding: called with each finding as it is made.
 
     Returns:
@@ -83,32 +84,33 @@ def verify(
     for finding in [*check_sums(folder), *check_cells(cells, folder)]:
         say(finding)
     if rerun is None:
-        for algorithm, family in columns(cells):
-            say(check_column(cells, folder, algorithm, family, epochs))
+        for column in columns(cells):
+            say(check_column(cells, folder, *column, epochs))
     for cell in rerun or ():
         say(check_rerun(cell, folder, epochs))
     return findings
 
 
-def columns(cells: Sequence[Cell]) -> list[tuple[str, str]]:
-    """Return each algorithm × family among some cells, in their order.
+def columns(cells: Sequence[Cell]) -> list[tuple[str, str, str]]:
+    """Return each algorithm × family × engine among some cells, in their order.
 
     Example:
         >>> from inbounds.study.grid import study_cells
         >>> len(columns(study_cells()))
         8
     """
-    return list(dict.fromkeys((cell.algorithm, cell.family) for cell in cells))
+    return list(dict.fromkeys((cell.algorithm, cell.family, cell.engine) for cell in cells))
 
 
 def check_column(
-    cells: Sequence[Cell], folder: StudyFolder, algorithm: str, family: str, epochs: int
+    cells: Sequence[Cell], folder: StudyFolder, algorithm: str, family: str, engine: str, epochs: int
 ) -> Checked:
     """Run the first epochs of a column's first finished cell again; say so where it has none."""
+    wanted = (algorithm, family, engine)
     for cell in cells:
-        if (cell.algorithm, cell.family) == (algorithm, family) and folder.state(cell) == "finished":
+        if (cell.algorithm, cell.family, cell.engine) == wanted and folder.state(cell) == "finished":
             return check_rerun(cell, folder, epochs)
-    return Checked(f"{algorithm} × {family}", True, NOTHING_TO_RERUN)
+    return Checked(" × ".join(wanted), True, NOTHING_TO_RERUN)
 
 
 def check_sums(folder: StudyFolder) -> list[Checked]:
@@ -185,7 +187,7 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
         run.epoch()
     run.close()
     here, there = provenance(), metadata["sessions"][0]
-    if not _same_arithmetic(here, there):
+    if not _same_arithmetic(here, there, cell.engine):
         return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)
     mismatch = first_mismatch(rows.filter(pc.less(rows["epoch"], epochs)), run.table())
     if mismatch:
@@ -197,10 +199,11 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
     return Checked(cell.id, True, f"{epochs} epochs repeated exactly")
 
 
-def _same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any]) -> bool:
-    """Whether two processes have the processor and the wheels in common, and so compute the same bits."""
-    noted = [name for name in WHEELS if name in there["versions"]]
-    same_wheels = all(here["versions"][name] == there["versions"][name] for name in noted)
+def _same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any], engine: str) -> bool:
+    """Return whether two processes have processor and wheels in common, and so compute the same bits with an engine."""
+    wheels = (*WHEELS, *COMPILERS) if engine == "compiled" else WHEELS
+    noted = [name for name in wheels if name in there["versions"]]
+    same_wheels = all(here["versions"].get(name) == there["versions"][name] for name in noted)
     return same_wheels and here["processor"] == there["processor"]
 
 
