@@ -67,7 +67,7 @@ def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
     assert [finding[::2] for finding in findings] == [
         ("checksums.txt", "3 of 3 files have their checksums"),
         (CELL.id, "10 epochs repeated exactly"),
-        ("trpo × gaussian", "skipped: none of its cells is finished"),
+        ("trpo × gaussian × autograd", "skipped: none of its cells is finished"),
     ]
 
 
