@@ -56,14 +56,17 @@ def inbounds_config(work: Work, algo: str, seeds: int, family: str) -> Any:
     )
 
 
-def inbounds(algo: str, seeds: int, family: str = "gaussian") -> Callable[[Work], Turn]:
-    """This engine."""
+def inbounds(
+    algo: str, seeds: int, family: str = "gaussian", engine: str = "autograd"
+) -> Callable[[Work], Turn]:
+    """This package, by either engine."""
 
     def start(work: Work) -> Turn:
         from inbounds.learning import Trainer
         from inbounds.learning.storage import checkpoint
 
-        trainer = Trainer(inbounds_config(work, algo, seeds, family))
+        config = inbounds_config(work, algo, seeds, family)
+        trainer = Trainer(dataclasses.replace(config, engine=engine))
         path = Path(tempfile.mkdtemp()) / checkpoint.FILE_NAME
 
         def turn() -> int:
@@ -176,12 +179,65 @@ def cleanrl(work: Work) -> Turn:
     return turn
 
 
+def rltools(work: Work) -> Turn:
+    """RLtools' PPO (Eschmann et al.), C++ that its own interface compiles for these shapes, with Gymnasium's robot.
+
+    Its interface trains one seed. Its observations are normalised, in C++; it evaluates nothing, and writes nothing.
+    """
+    import gymnasium
+    from rltools import PPO
+
+    hidden, depth = work.hidden[0], len(work.hidden) + 1
+    shape: dict[str, Any] = {}
+    for network in ("ACTOR", "CRITIC"):
+        shape |= {f"{network}_HIDDEN_DIM": hidden, f"{network}_NUM_LAYERS": depth}
+        shape[f"{network}_ACTIVATION_FUNCTION"] = "TANH"
+    loop = PPO(
+        lambda: gymnasium.make(work.env),
+        interface_name=f"{work.env.replace('-', '_').lower()}_{work.horizon}",
+        enable_evaluation=False,
+        STEP_LIMIT=10**6,
+        GAMMA=work.gamma,
+        LAMBDA=work.gae_lambda,
+        INITIAL_ACTION_STD=1.0,
+        ACTION_ENTROPY_COEFFICIENT=1e-4,
+        NORMALIZE_OBSERVATIONS=True,
+        N_EPOCHS=work.num_epochs,
+        N_ENVIRONMENTS=1,
+        ON_POLICY_RUNNER_STEPS_PER_ENV=work.horizon,
+        BATCH_SIZE=work.minibatch_size,
+        OPTIMIZER_ALPHA=work.learning_rate,
+        **shape,
+    )
+    state = loop.State(0)
+
+    def turn() -> int:
+        state.step()
+        return work.horizon
+
+    return turn
+
+
 CONTESTANTS: dict[str, Contestant] = {
     "inbounds-ppo-10": Contestant("In Bounds PPO, S = 10", inbounds("ppo", 10), "inbounds", "PPO", 10),
     "inbounds-ppo-1": Contestant("In Bounds PPO, S = 1", inbounds("ppo", 1), "inbounds", "PPO"),
     "inbounds-logit-normal-10": Contestant(
         "… logit-normal, S = 10", inbounds("ppo", 10, "logit-normal"), "inbounds", "PPO", 10
     ),
+    "inbounds-compiled-10": Contestant(
+        "In Bounds PPO, compiled, S = 10", inbounds("ppo", 10, engine="compiled"), "numba", "PPO", 10
+    ),
+    "inbounds-compiled-1": Contestant(
+        "In Bounds PPO, compiled, S = 1", inbounds("ppo", 1, engine="compiled"), "numba", "PPO"
+    ),
+    "inbounds-compiled-logit-normal-10": Contestant(
+        "… compiled, logit-normal, S = 10",
+        inbounds("ppo", 10, "logit-normal", "compiled"),
+        "numba",
+        "PPO",
+        10,
+    ),
+    "rltools-ppo": Contestant("RLtools PPO (C++)", rltools, "rltools", "PPO"),
     "sb3-ppo": Contestant(
         "stable-baselines3 PPO", stable_baselines("stable_baselines3", "PPO"), "stable_baselines3", "PPO"
     ),

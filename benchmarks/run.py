@@ -39,15 +39,19 @@ PACKAGES = (
     "sbx-rl",
     "jax",
     "cleanrl",
+    "rltools",
+    "numba",
 )
 EXAMPLES = """
 examples:
-  python -m benchmarks.run                                        everything; about fifteen minutes
+  python -m benchmarks.run                                        everything; about twenty-five minutes
   python -m benchmarks.run --quick                                does it run? about a minute
   python -m benchmarks.run --envs Hopper-v5 --contestants inbounds-ppo-10 sb3-ppo floor
   python -m benchmarks.run --python sbx-ppo=peers/bin/python --python cleanrl-ppo=peers/bin/python
 
 peers of another stack:
+  RLtools is in the extra `bench`, and compiles itself with g++ or clang++, a minute for each robot; without them it
+  sits out.
   SBX needs JAX. CleanRL's wheel asks for an older Python than it needs, and for older libraries. Give them an
   environment of their own, with the versions of gymnasium, mujoco and torch that stand in constraints.txt:
     python -m venv peers

@@ -122,12 +122,12 @@ def test_a_wrong_choice_is_explained(words: list[str], fix: str, capsys: pytest.
 
 @pytest.mark.slow
 def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture) -> None:
-    names = ["floor", "inbounds-ppo-10", "sb3-ppo", "inbounds-trpo-1", "sb3-trpo", "sbx-ppo"]
+    names = ["floor", "inbounds-ppo-10", "inbounds-compiled-1", "rltools-ppo", "sb3-ppo", "sbx-ppo"]
     run.main(["--quick", "--output", str(tmp_path), "--contestants", *names])
     results = json.loads((tmp_path / "quick" / "speed.json").read_text())
     measured = results["measurements"]["Hopper-v5"]
     assert set(names) - set(results["unavailable"]) == set(measured)
-    assert set(results["unavailable"]) <= {"sbx-ppo"}
+    assert set(results["unavailable"]) <= {"sbx-ppo", "rltools-ppo"}
     assert measured["inbounds-ppo-10"][0]["steps"] == 2560
     assert all(turn["peak_bytes"] > 1e8 for turns in measured.values() for turn in turns)
     assert "## Ratios" in (tmp_path / "quick" / "speed.md").read_text()
@@ -144,6 +144,13 @@ def test_the_readme_quotes_what_was_measured() -> None:
     measured = {
         (bar.env.partition("-")[0], "TRPO" if "trpo" in bar.ours else "PPO"): f"{np.median(values):.1f}"
         for bar, values in report.bars(results)
+        if bar.theirs.startswith("sb3")
     }
+    over_rltools = {
+        bar.env.partition("-")[0]: f"{np.median(values):.2f}"
+        for bar, values in report.bars(results)
+        if bar.theirs == "rltools-ppo"
+    }
+    assert dict((env, n) for n, env in re.findall(r"(\d+\.\d\d) on\s+(\w+)", quoted)) == over_rltools
     found = re.findall(r"(\d+\.\d) on\s+(\w+)( under TRPO)?", quoted)
     assert {(env, "TRPO" if trpo else "PPO"): number for number, env, trpo in found} == measured

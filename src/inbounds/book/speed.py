@@ -35,6 +35,7 @@ Results: TypeAlias = Mapping[str, Any]
 """What a JSON file of measurements holds."""
 
 OURS = "inbounds-ppo-10"
+COMPILED = "inbounds-compiled-10"
 COMPARISONS = (
     (OURS, "sb3-ppo"),
     (OURS, "sb3-ppo-plain"),
@@ -42,11 +43,15 @@ COMPARISONS = (
     (OURS, "cleanrl-ppo"),
     (OURS, "inbounds-ppo-1"),
     ("inbounds-trpo-10", "sb3-trpo"),
+    (COMPILED, OURS),
+    (COMPILED, "rltools-ppo"),
+    ("inbounds-compiled-1", "rltools-ppo"),
     (OURS, "floor"),
+    (COMPILED, "floor"),
 )
 """Rows of the table of ratios: who, over whom."""
 NO_SPEED = (
-    "Not measured in this copy of the book. `make bench` measures it (about fifteen minutes on a quiet machine) and "
+    "Not measured in this copy of the book. `make bench` measures it (twenty-five minutes on a quiet machine) and "
     "writes `benchmarks/results/speed.json`; then build the book again."
 )
 NO_VALIDATION = (
