@@ -28,6 +28,7 @@ from tests.book.exercises import (
     test_six_untrained_robots,
     test_tanh_gaussian,
     test_trpo,
+    test_update_without_autograd,
 )
 
 NOTEBOOKS = Path(__file__).resolve().parents[3] / "notebooks"
@@ -52,6 +53,7 @@ RIGHT = [
         "logit_normal_moments": test_logit_normal_moments.RIGHT,
         "six_untrained_robots": test_six_untrained_robots.RIGHT,
         "tanh_gaussian": test_tanh_gaussian.RIGHT,
+        "update_without_autograd": test_update_without_autograd.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
     }.items()
     for name, right in answers.items()
