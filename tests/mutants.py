@@ -839,10 +839,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/learning/test_compiled.py::test_a_gradient_step_is_autograds[clipped-gaussian-no bonus]",
     ),
     Mutant(
-        "compiled seeds are evaluated side by side",
-        "learning/rollout.py",
-        "if self._acting is None:\n            return evaluate",
-        "if True:\n            return evaluate",
+        "compiled seeds shuffle by the first one's generator",
+        "learning/updates/compiled.py",
+        "update(network, optimizer, rollout.seed(s), [generator], config)",
+        "update(network, optimizer, rollout.seed(s), [generators[0]], config)",
         "tests/learning/test_compiled.py::test_a_seed_alone_is_the_seed_in_company",
     ),
     Mutant(
