@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.statistics.settings import SIGNIFICANCE
 
 
 def spoken(estimate: Estimate | None, digits: int | None = None) -> str:
@@ -68,7 +68,7 @@ def side(low: float | np.ndarray, high: float | np.ndarray, against: float = 0.0
     return int(float(low) > against) - int(float(high) < against)
 
 
-def verdict(comparison: Comparison, level: float = 1 - LEVEL) -> str:
+def verdict(comparison: Comparison, level: float = SIGNIFICANCE) -> str:
     """Say in a word what a comparison shows.
 
     Example:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -85,13 +85,18 @@ class Runs:
 
     seeds: tuple[int, ...]
     returns: Array
-    """`[seeds, epochs]`; NaN where no episode ended or the policy had diverged."""
+    """`[seeds, epochs]`; NaN where no episode ended or the policy had diverged before."""
     diverged: NDArray[np.bool_]
-    """`[seeds]`: at the end."""
+    """`[seeds]`: sooner or later."""
     noise: Array
     """`[seeds]`: standard deviation of the executed actions in the first epoch."""
     saturation: Array
     """`[seeds]`: share of the executed actions at a bound in the first epoch."""
+
+    @property
+    def all_returned(self) -> bool:
+        """Whether every seed has a return at all."""
+        return not bool(np.isnan(self.returns).all(1).any())
 
     def endpoint(self, name: str) -> Array:
         """Return the final return or the area of each seed; NaN for one that never had a return."""
@@ -112,12 +117,12 @@ def repeated(returns: Array) -> Array:
     return np.take_along_axis(returns, np.where(last < 0, known.argmax(1)[:, None], last), 1)
 
 
-def read(folder: Path) -> dict[tuple[Column, str], Runs]:
-    """Read every finished cell of the second study below a results folder."""
+def read(folder: Path, seeds: tuple[int, ...] = TWENTY) -> dict[tuple[Column, str], Runs]:
+    """Read the finished cells of the second study with these seeds below a results folder."""
     parts: dict[tuple[Column, str], list[Runs]] = {}
     for path in sorted((folder / "cells").glob("*.parquet")):
         about = json.loads(pq.read_schema(path).metadata[b"inbounds"])
-        if about["study_version"] == 2:
+        if about["study_version"] == 2 and set(about["config"]["seeds"]) <= set(seeds):
             parts.setdefault((_column(about), about["robot"]), []).append(_runs(path, about["config"]))
     return {key: _together(runs) for key, runs in parts.items()}
 
@@ -134,18 +139,17 @@ def _column(about: dict[str, Any]) -> Column:
 
 def _runs(path: Path, config: dict[str, Any]) -> Runs:
     names = ["epoch", "seed", "return_mean", "diverged", "action_std", "saturation"]
-    columns = {
-        name: np.array(column) for name, column in pq.read_table(path, columns=names).to_pydict().items()
-    }
+    table = pq.read_table(path, columns=names)
+    columns = {name: table[name].to_numpy() for name in names}
     order = np.lexsort((columns["epoch"], columns["seed"]))
     grid = {name: values[order].reshape(-1, EPOCHS) for name, values in columns.items()}
     seeds = tuple(int(seed) for seed in grid["seed"][:, 0])
     assert sorted(config["seeds"]) == list(seeds)
     assert (grid["epoch"] == np.arange(EPOCHS)).all()
-    gone = grid["diverged"].astype(bool)
-    returns = np.where(gone, np.nan, grid["return_mean"].astype(float))
+    # The epoch in whose update a seed diverged was played before it: its return is in the file, and counts.
+    gone, returns = grid["diverged"].astype(bool).any(1), grid["return_mean"].astype(float)
     first = [grid[name][:, 0].astype(float) for name in ("action_std", "saturation")]
-    return Runs(seeds, returns, gone[:, -1], *first)
+    return Runs(seeds, returns, gone, *first)
 
 
 def _together(parts: Sequence[Runs]) -> Runs:
@@ -172,14 +176,21 @@ class Row:
     seeds: tuple[int, int]
     diverged: tuple[int, int]
     """How many seeds of the bounded law and of the Gaussian."""
-    difference: float
-    low: float
-    high: float
-    p: float
-    p_holm: float
     margin: float
-    verdict: Verdict | None
+    difference: float = np.nan
+    share: float = np.nan
+    """Of the replicates, left out at each end."""
+    low: float = np.nan
+    high: float = np.nan
+    p: float = np.nan
+    p_holm: float = np.nan
+    verdict: Verdict | None = None
     """None before all twenty seeds of both sides are there."""
+
+
+def verdict_of(row: Row) -> Verdict:
+    """Return a row's word."""
+    return judged(row.low, row.high, row.difference, row.p_holm, row.margin)
 
 
 def judged(low: float, high: float, difference: float, p_holm: float, margin: float) -> Verdict:
@@ -192,37 +203,40 @@ def judged(low: float, high: float, difference: float, p_holm: float, margin: fl
 
 
 def primary(
-    folder: Path, *, resamples: int = RESAMPLES, permutations: int = PERMUTATIONS, seed: int = 20260
+    folder: Path,
+    *,
+    without_diverged: bool = False,
+    resamples: int = RESAMPLES,
+    permutations: int = PERMUTATIONS,
+    seed: int = 20260,
 ) -> list[Row]:
     """Return the 24 rows, laws outermost, then endpoints, then robots."""
     rng, cells, table = np.random.default_rng(seed), read(folder), yardsticks()
-    places = [(law, endpoint, robot) for law in LAWS for endpoint in ENDPOINTS for robot in ROBOTS]
-    found, p_values = [], np.full(len(places), np.nan)
-    for place, (law, endpoint, robot) in enumerate(places):
+    rows: list[Row] = []
+    for law, endpoint, robot in [(x, y, z) for x in LAWS for y in ENDPOINTS for z in ROBOTS]:
         sides = [cells.get((column, robot)) for column in (BOUNDED[law], GAUSSIAN_FREE)]
-        values = [np.empty(0) if side is None else side.endpoint(endpoint) for side in sides]
-        x, y = (side[~np.isnan(side)] for side in values)
-        difference, low, high = [float("nan")] * 3
-        if min(len(x), len(y)) > 1:
-            share = expanded_share(x, y)
-            difference = float(x.mean() - y.mean())
-            replicates = bootstrap_difference(x, y, rng, resamples)
-            low, high = (float(end) for end in np.quantile(replicates, [share, 1 - share]))
-        whole = all(side is not None and side.seeds == TWENTY for side in sides)
-        if whole and len(x) == len(y) == len(TWENTY):
-            p_values[place] = permutation_p(x, y, rng, permutations)
+        x, y = (_counting(side, endpoint, without_diverged) for side in sides)
         gone = [0 if side is None else int(side.diverged.sum()) for side in sides]
         margin = table[robot].margin_final if endpoint == "final" else table[robot].margin_area
-        found.append(
-            (law, endpoint, robot, (len(x), len(y)), (gone[0], gone[1]), difference, low, high, margin)
-        )
-    rows = []
-    for (*where, difference, low, high, margin), p, adjusted in zip(
-        found, p_values, holm(p_values), strict=True
-    ):
-        verdict = None if np.isnan(p) else judged(low, high, difference, adjusted, margin)
-        rows.append(Row(*where, difference, low, high, float(p), float(adjusted), margin, verdict))
-    return rows
+        row = Row(law, endpoint, robot, (len(x), len(y)), (gone[0], gone[1]), margin)
+        if min(len(x), len(y)) > 1:
+            share, replicates = expanded_share(x, y), bootstrap_difference(x, y, rng, resamples)
+            low, high = np.quantile(replicates, [share, 1 - share])
+            row = replace(row, difference=x.mean() - y.mean(), share=share, low=low, high=high)
+        if all(side is not None and side.seeds == TWENTY and side.all_returned for side in sides):
+            row = replace(row, p=permutation_p(x, y, rng, permutations))
+        rows.append(row)
+    adjusted = holm(np.array([row.p for row in rows]))
+    rows = [replace(row, p_holm=float(p)) for row, p in zip(rows, adjusted, strict=True)]
+    return [row if np.isnan(row.p) else replace(row, verdict=verdict_of(row)) for row in rows]
+
+
+def _counting(side: Runs | None, endpoint: str, without_diverged: bool) -> Array:
+    """Return the endpoint of the seeds that count."""
+    if side is None:
+        return np.empty(0)
+    values = side.endpoint(endpoint)
+    return values[~(np.isnan(values) | (side.diverged & without_diverged))]
 
 
 # The manipulation check and the aggregates ---------------------------------------------------------------------------
@@ -239,8 +253,8 @@ class Manipulation:
     """An equal start was asked for, and is missed by more than 0.02."""
 
 
-def manipulations(folder: Path) -> dict[tuple[Column, str], Manipulation]:
-    """Return the check of each column and robot."""
+def manipulations(folder: Path, *, more_seeds: bool = True) -> dict[tuple[Column, str], Manipulation]:
+    """Return the check of each column and robot, over all their seeds or over 10 to 19 alone."""
     return {
         (column, robot): Manipulation(
             noise := float(runs.noise.mean()),
@@ -248,7 +262,7 @@ def manipulations(folder: Path) -> dict[tuple[Column, str], Manipulation]:
             float(np.nanmean(runs.returns[:, 0])),
             column.noise is not None and abs(noise - column.noise) > 0.02,
         )
-        for (column, robot), runs in read(folder).items()
+        for (column, robot), runs in read(folder, TWENTY if more_seeds else TWENTY[:10]).items()
     }
 
 

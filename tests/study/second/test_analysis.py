@@ -84,6 +84,7 @@ def estimate(value: float, half: float) -> Estimate:
     [
         (5.0, 1.0, 0.001, "confirmed"),
         (-5.0, 1.0, 0.001, "contradicted"),
+        (5.0, 1.0, 0.05, "undecided"),  # p has to be below it
         (5.0, 1.0, 0.051, "undecided"),
         (0.0, 1.9, 0.9, "refuted"),
         (0.5, 1.0, 0.001, "refuted"),  # found, and too small to matter

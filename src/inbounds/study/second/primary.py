@@ -16,7 +16,7 @@ from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.pooled import is_whole, pooled, pooled_scores
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Estimate
-from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.statistics.settings import SIGNIFICANCE
 
 RESAMPLES = 100_000
 PERMUTATIONS = 99_999
@@ -92,7 +92,7 @@ def finding(difference: Estimate, p_adjusted: float, margin: float) -> Finding:
     """
     if -margin < difference.low and difference.high < margin:
         return "refuted"
-    if p_adjusted < 1 - LEVEL:
+    if p_adjusted < SIGNIFICANCE:
         return "confirmed" if difference.value > 0 else "contradicted"
     return "undecided"
 

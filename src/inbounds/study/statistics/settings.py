@@ -2,6 +2,8 @@
 
 LEVEL = 0.95
 """Nominal coverage of every interval."""
+SIGNIFICANCE = 0.05
+"""A difference is found where p is below it. Not `1 - LEVEL`, which is a little more: 0.05 is not below 0.05."""
 RESAMPLES = 5000
 """Bootstrap replicates: enough that the ends of an interval move by a few hundredths of its width."""
 CURVE_RESAMPLES = 1000
