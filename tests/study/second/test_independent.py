@@ -142,10 +142,18 @@ def alike(theirs: statistics.Estimate, value: float, low: float, high: float) ->
 def same_starts(folder: StudyFolder, root: Path) -> None:
     outcomes = Outcomes.read(folder, second_cells())
     for (column, robot), mine in independent.manipulations(root, more_seeds=False).items():
-        if column in (independent.GAUSSIAN_FREE, *independent.BOUNDED.values()):
-            theirs = second.starts(outcomes, COLUMNS[column.law], robot)
-            wanted = {"action_std": mine.noise, "saturation": mine.saturation, "return": mine.first_return}
-            assert theirs == pytest.approx(wanted, rel=1e-6)
+        theirs = second.starts(outcomes, named(column), robot)
+        wanted = {"action_std": mine.noise, "saturation": mine.saturation, "return": mine.first_return}
+        assert theirs == pytest.approx(wanted, rel=1e-6)
+
+
+def named(column: independent.Column) -> Column:
+    """Return the package's name of a column."""
+    arms = {block: arm for arm, block in independent.BLOCKS.items()}
+    variant = {"E": f"noise-{column.noise}", "F": f"rate-{column.rate:g}"}
+    plain = "free-std" if column.free else ""
+    arm = arms.get(column.block, "equal")
+    return Column(arm, column.algorithm, column.law, variant.get(column.block, plain))
 
 
 def test_the_results_that_are_there() -> None:
