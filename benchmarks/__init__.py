@@ -3,6 +3,7 @@
 * `python -m benchmarks.run`: steps per second, one core, interleaved; a table, a plot, the raw numbers.
 * `python -m benchmarks.anatomy`: where the time of one epoch goes.
 * `python -m benchmarks.validate`: learning curves beside stable-baselines3's, with a test of equivalence.
+* `python -m benchmarks.anchor`: the same for the second study, by its protocol.
 
 Peers come with the extra `bench`; those of another stack (SBX, CleanRL) may live in another environment, see
 `python -m benchmarks.run --help`.

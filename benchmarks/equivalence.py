@@ -56,8 +56,21 @@ def seeds_needed(ours: ArrayLike, theirs: ArrayLike, margin: float = 0.15, level
         (8, 122)
     """
     samples = np.asarray(ours, float), np.asarray(theirs, float)
-    variation = sum((x.std(ddof=1) / x.mean()) ** 2 for x in samples)
-    return int(np.ceil(variation * (stats.norm.isf(level) + stats.norm.isf(0.1)) ** 2 / margin**2))
+    return _seeds(sum((x.std(ddof=1) / x.mean()) ** 2 for x in samples), margin, level)
+
+
+def seeds_needed_within(ours: ArrayLike, theirs: ArrayLike, margin: float, level: float = 0.05) -> int:
+    """Return the same for a margin in the samples' own units, where the difference of the means is tested.
+
+    Example:
+        >>> seeds_needed_within([90, 100, 110], [90, 100, 110], margin=15)
+        8
+    """
+    return _seeds(sum(np.var(x, ddof=1) for x in (ours, theirs)), margin, level)
+
+
+def _seeds(variance: float, margin: float, level: float) -> int:
+    return int(np.ceil(variance * (stats.norm.isf(level) + stats.norm.isf(0.1)) ** 2 / margin**2))
 
 
 def _one_sided(ours: NDArray[np.float64], theirs: NDArray[np.float64], ratio: float) -> tuple[float, float]:

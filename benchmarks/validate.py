@@ -11,11 +11,9 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import multiprocessing
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +23,12 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.equivalence import area, equivalence, seeds_needed
 from benchmarks.run import machine, versions
-from benchmarks.worker import THREADS
+from benchmarks.side_by_side import OURS, PEER, Job, jobs, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
-OURS, PEER = "inbounds", "stable-baselines3"
 EXAMPLES = """
 examples:
   python -m benchmarks.validate                       10 seeds, 307 200 steps, two robots; about 45 minutes on two cores
@@ -40,153 +36,6 @@ examples:
   python -m benchmarks.validate --seeds 10 20         ten on Hopper, twenty on HalfCheetah
   python -m benchmarks.validate --quick               does it run? half a minute
 """
-_epochs_done: Any = None  # a counter shared by all processes
-
-
-@dataclasses.dataclass(frozen=True)
-class Job:
-    """Seeds of one side on one robot, trained by one process."""
-
-    env: str
-    who: str
-    seeds: tuple[int, ...]
-    epochs: int
-    horizon: int
-    normalize: bool
-    folder: Path
-
-    @property
-    def name(self) -> str:
-        """Of its files: what its curves depend on, but for the seed."""
-        seen = "normalized" if self.normalize else "raw"
-        return f"{self.env}-{self.who}-{self.epochs}x{self.horizon}-{seen}"
-
-    def curve_file(self, seed: int) -> Path:
-        """Return where a finished seed's curve lies."""
-        return self.folder / "runs" / f"{self.name}-{seed}.parquet"
-
-    def keep(self, seed: int, returns: Sequence[float], episodes: Sequence[int]) -> None:
-        """Write a finished seed's curve, whole or not at all."""
-        columns = {
-            "env": [self.env] * self.epochs,
-            "who": [self.who] * self.epochs,
-            "seed": [seed] * self.epochs,
-            "env_steps": [self.horizon * (epoch + 1) for epoch in range(self.epochs)],
-            "return_mean": np.asarray(returns, np.float64),
-            "episodes": np.asarray(episodes, np.int64),
-        }
-        path = self.curve_file(seed)
-        pq.write_table(pa.table(columns), path.with_suffix(".partial"))
-        os.replace(path.with_suffix(".partial"), path)
-
-
-def train_ours(job: Job, on_epoch: Callable[[], None]) -> None:
-    """Train all seeds of the job in lockstep, from the checkpoint if there is one."""
-    from inbounds.learning import preset, train
-
-    config = preset("common", job.env, policy="gaussian", seeds=job.seeds, epochs=job.epochs)
-    config = dataclasses.replace(
-        config,
-        policy=dataclasses.replace(config.policy, state_dependent_std=False),
-        algorithm=dataclasses.replace(config.algorithm, entropy_coef=0.0, horizon=job.horizon),
-        normalize_obs=job.normalize,
-    )
-    run_dir = job.folder / "runs" / f"{job.name}-{'-'.join(map(str, job.seeds))}"
-    run = train(config, run_dir=run_dir, callback=lambda *_: on_epoch())
-    if run.diverged.any():
-        raise RuntimeError(f"{job.env}: seeds {np.array(job.seeds)[run.diverged].tolist()} diverged")
-    for i, seed in enumerate(job.seeds):
-        job.keep(seed, [r["return_mean"][i] for r in run.records], [r["episodes"][i] for r in run.records])
-
-
-def train_peer(job: Job, on_epoch: Callable[[], None]) -> None:
-    """Train the one seed of the job."""
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.env_util import make_vec_env
-    from stable_baselines3.common.vec_env import VecNormalize
-
-    class Epochs(BaseCallback):
-        def __init__(self) -> None:
-            super().__init__()
-            self.finished: list[list[float]] = []
-
-        def _on_rollout_start(self) -> None:
-            self.finished.append([])
-
-        def _on_step(self) -> bool:
-            self.finished[-1] += [info["episode"]["r"] for info in self.locals["infos"] if "episode" in info]
-            return True
-
-        def _on_rollout_end(self) -> None:
-            on_epoch()
-
-    (seed,) = job.seeds
-    epochs = Epochs()
-    envs: Any = make_vec_env(job.env, seed=seed)
-    if job.normalize:
-        envs = VecNormalize(envs, norm_reward=False)
-    model = PPO("MlpPolicy", envs, n_steps=job.horizon, seed=seed, device="cpu")
-    model.learn(job.epochs * job.horizon, callback=epochs)
-    job.keep(
-        seed, [float(np.mean(r)) if r else np.nan for r in epochs.finished], [len(r) for r in epochs.finished]
-    )
-
-
-def work_off(job: Job) -> None:
-    """Do a job in this process, on one thread."""
-    import torch
-
-    torch.set_num_threads(1)
-
-    def on_epoch() -> None:
-        with _epochs_done.get_lock():
-            _epochs_done.value += len(job.seeds)
-
-    (train_ours if job.who == OURS else train_peer)(job, on_epoch)
-
-
-def _share(counter: Any) -> None:
-    global _epochs_done  # noqa: PLW0603
-    _epochs_done = counter
-
-
-def jobs(whole: Sequence[Job]) -> list[Job]:
-    """Return what of these jobs is still to be done, split as it is trained, the longest first.
-
-    Our seeds are trained in lockstep by one process, the peer's each by one of its own.
-    """
-    todo = []
-    for job in whole:
-        missing = tuple(s for s in job.seeds if not job.curve_file(s).exists())
-        groups = [missing] if job.who == OURS and missing else [(s,) for s in missing]
-        todo += [dataclasses.replace(job, seeds=seeds) for seeds in groups]
-    return sorted(todo, key=lambda job: len(job.seeds), reverse=True)
-
-
-def run_jobs(todo: Sequence[Job], workers: int, console: Console) -> None:
-    """Do the jobs, each in a process of its own, and show how far they are."""
-    context = multiprocessing.get_context("spawn")
-    counter = context.Value("q", 0)
-    os.environ.update(dict.fromkeys(THREADS, "1"))  # inherited by the processes
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with (
-        Progress(*columns, console=console) as progress,
-        ProcessPoolExecutor(workers, context, _share, (counter,), max_tasks_per_child=1) as pool,
-    ):
-        task = progress.add_task("epochs × seeds", total=sum(len(job.seeds) * job.epochs for job in todo))
-        futures = [pool.submit(work_off, job) for job in todo]
-        while not all(future.done() for future in futures):
-            progress.update(task, completed=counter.value)
-            time.sleep(0.5)
-        progress.update(task, completed=counter.value)
-        for future in futures:
-            future.result()
 
 
 def curves(table: pa.Table, env: str, who: str) -> NDArray[np.float64]:
@@ -211,8 +60,20 @@ def judge(table: pa.Table, env: str, margin: float) -> dict[str, Any]:
     return verdict
 
 
-def plot(table: pa.Table, verdicts: dict[str, Any]) -> tuple[Any, str]:
-    """Return a figure, a panel per robot, and its alt text."""
+def facts(verdicts: dict[str, Any]) -> str:
+    """Return the verdicts' numbers as a sentence of an alt text."""
+    return "; ".join(
+        f"on {env} the mean area under our curves is {v['ratio']:.2f} of the peer's "
+        f"(90 % interval {v['low']:.2f} to {v['high']:.2f})"
+        for env, v in verdicts.items()
+        if "ratio" in v
+    )
+
+
+def plot(
+    table: pa.Table, verdicts: dict[str, Any], say: Callable[[dict[str, Any]], str] = facts
+) -> tuple[Any, str]:
+    """Return a figure, a panel per robot, and its alt text, which ends in what `say` makes of the verdicts."""
     import matplotlib.pyplot as plt
     from scipy import stats
 
@@ -232,18 +93,8 @@ def plot(table: pa.Table, verdicts: dict[str, Any]) -> tuple[Any, str]:
         ax.set(title=env, xlabel="env steps (thousands)")
     axes[0, 0].set(ylabel="return in training")
     axes[0, 0].legend(loc="upper left")
-    facts = [
-        f"on {env} the mean area under our curves is {v['ratio']:.2f} of the peer's "
-        f"(90 % interval {v['low']:.2f} to {v['high']:.2f})"
-        for env, v in verdicts.items()
-        if "ratio" in v
-    ]
-    return (
-        fig,
-        "Return against env steps, mean and 95 % interval over seeds, two lines per robot: "
-        + "; ".join(facts)
-        + ".",
-    )
+    shown = "Return against env steps, mean and 95 % interval over seeds, two lines per robot"
+    return fig, f"{shown}: {say(verdicts)}."
 
 
 def finish(done: Sequence[Job], margin: float) -> dict[str, Any]:
