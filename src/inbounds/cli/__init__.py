@@ -34,7 +34,8 @@ EXAMPLES = {
   inbounds study run standard --nice 19 --max-minutes 60
   inbounds study run --scheduler tcp://host:8786      (on a Dask cluster; see `inbounds.study.running.cluster`)
   inbounds study report --out report.html
-  inbounds study verify --random 2 --epochs 20""",
+  inbounds study verify --random 2 --epochs 20
+  inbounds study dial --help      (a task with three knobs: when does the law matter?)""",
 }
 
 

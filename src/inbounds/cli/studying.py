@@ -142,9 +142,16 @@ def study(args: Sequence[str]) -> int:
         standard-swimmer-trpo-logit-normal: missing
         0
     """
+    if args[:1] == ["dial"]:
+        from inbounds.cli.dialing import dial
+
+        return dial(args[1:])
     read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
     kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
-    description = "The study of the book: all algorithms, families and robots, ten seeds each."
+    description = (
+        "The study of the book: all algorithms, families and robots, ten seeds each. "
+        "inbounds study dial: a small task, and when the law matters there."
+    )
     console = Console(highlight=False, force_jupyter=False)
     try:
         command: StudyCommand = read(

@@ -1,5 +1,6 @@
 """The dial's task against its own definition: optimum and idle return by search, moments by quadrature, no coupling."""
 
+import itertools
 import math
 
 import numpy as np
@@ -51,7 +52,7 @@ def integral(family: str, outputs: np.ndarray, function) -> float:
         edges = sorted({law.mean() - 12 * law.std(), -1.0, 1.0, law.mean(), law.mean() + 12 * law.std()})
     return sum(
         integrate.quad(lambda x: law.pdf(x) * function(map_(x)), a, b, epsabs=1e-11)[0]
-        for a, b in zip(edges, edges[1:], strict=False)
+        for a, b in itertools.pairwise(edges)
     )
 
 

@@ -1,4 +1,4 @@
-"""What the map is made of: the policies, the settings of the knobs, and the run of each, as `results/DIAL.md` fixes them."""
+"""What the map is made of: policies, settings of the knobs, and the run of each, as `results/DIAL.md` fixes them."""
 
 from __future__ import annotations
 

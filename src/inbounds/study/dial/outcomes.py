@@ -1,6 +1,6 @@
 """What the map shows, beside what was predicted: differences with intervals, classes, hits and misses.
 
-The rule of `results/DIAL.md`, in code: a difference of means falls into a class, *above*, *below* or *no difference*, by its
+The rule of `results/DIAL.md`, in code: a difference of means is *above*, *below* or *no difference*, by its
 interval and a margin; a prediction is right if it names the class, wrong if it names another, and undecided where the
 interval falls into none.
 """

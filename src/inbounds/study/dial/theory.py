@@ -18,6 +18,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from inbounds.learning import PPOConfig
 from inbounds.study.dial.cells import INITIAL_STD, POLICIES, DialCell
 from inbounds.study.dial.laws import Pair, expected_return, information, start
 from inbounds.study.dial.task import DialTask
@@ -111,8 +112,9 @@ def predicted_curve(cell: DialCell, model: Model = "steps", rates: Rates | None 
     rates = rates or Rates()
     family, state_dependent = POLICIES[cell.policy]
     ppo = cell.config.algorithm
-    updates = ppo.num_epochs * ppo.horizon // ppo.minibatch_size  # type: ignore[union-attr]
-    free_step = None if state_dependent else ppo.learning_rate * updates  # type: ignore[union-attr]
+    assert isinstance(ppo, PPOConfig)
+    updates = ppo.num_epochs * ppo.horizon // ppo.minibatch_size
+    free_step = None if state_dependent else ppo.learning_rate * updates
     outputs, scores = start(family, INITIAL_STD), []
     for _ in range(cell.epochs):
         scores.append(float(cell.task.score(expected_return(cell.task, family, outputs))))

@@ -1,0 +1,149 @@
+"""`inbounds study dial run | status | show | verify`: the map of when the law matters."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, Union
+
+import tyro
+from rich.console import Console
+from tyro.conf import subcommand
+
+from inbounds.learning.storage.whole_files import DamagedFileError
+from inbounds.study.dial.cells import dial_cells
+from inbounds.study.dial.outcomes import DialOutcomes, constant_guess, tally
+from inbounds.study.dial.running import DialFolder, run_cells, wrong_cells
+from inbounds.study.dial.theory import MODELS
+from inbounds.study.words import spoken
+
+EXAMPLES = """\
+  inbounds study dial run            (about ten minutes of one core; goes on where it stopped)
+  inbounds study dial status
+  inbounds study dial show
+  inbounds study dial verify --random 2"""
+
+
+@dataclass(frozen=True)
+class _Where:
+    results: Path = DialFolder.results
+    """Folder of the map."""
+    work: Path = DialFolder.work
+    """Folder of the cells until the map is whole."""
+
+    def folder(self) -> DialFolder:
+        """Return the two folders."""
+        return DialFolder(self.results, self.work)
+
+
+@dataclass(frozen=True)
+class Run(_Where):
+    """Run the cells that are not finished, one after another, and write the map when all are."""
+
+
+@dataclass(frozen=True)
+class Status(_Where):
+    """Say how many cells are finished, and whether the map is written."""
+
+
+@dataclass(frozen=True)
+class Show(_Where):
+    """Print every comparison with its interval beside what was predicted, and how often each model was right."""
+
+
+@dataclass(frozen=True)
+class Verify(_Where):
+    """Check the map's sum, and run the first epochs of some cells again."""
+
+    random: int = 2
+    """How many cells."""
+    random_seed: int = 0
+    """Of that choice."""
+    epochs: int = 2
+    """To run again."""
+
+
+DialCommand: TypeAlias = Run | Status | Show | Verify
+COMMANDS: dict[str, type[DialCommand]] = {"run": Run, "status": Status, "show": Show, "verify": Verify}
+
+
+def dial(args: Sequence[str]) -> int:
+    """Do what a command line after `inbounds study dial` says.
+
+    Args:
+        args: its words.
+
+    Returns:
+        The exit code: 0; 1 where something failed; 2 where the command line is wrong.
+
+    Raises:
+        SystemExit: help was asked for, or the command line is wrong; either has been written.
+
+    Example:
+        >>> dial(["status", "--results", "no/results", "--work", "no/work"])
+        0 of 100 cells are finished, the map is not written
+        0
+    """
+    read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
+    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
+    console = Console(highlight=False, force_jupyter=False)
+    try:
+        command: DialCommand = read(
+            Union[kinds],  # noqa: UP007
+            args=list(args) or ["--help"],
+            prog="inbounds study dial",
+            description="The dial: when does the law matter? A map over three knobs, fixed in results/DIAL.md.",
+        )
+    except SystemExit as exit_:
+        if exit_.code == 0:
+            print(f"\nexamples:\n{EXAMPLES}")
+        raise
+    try:
+        return _do(command, console)
+    except (DamagedFileError, OSError) as error:
+        Console(stderr=True, highlight=False).print(
+            f"inbounds study dial: {error}", markup=False, soft_wrap=True
+        )
+        return 1
+
+
+def _do(command: DialCommand, console: Console) -> int:
+    folder, cells = command.folder(), dial_cells()
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, soft_wrap=True)
+
+    if isinstance(command, Run):
+        whole = run_cells(cells, folder, say)
+        say(f"map: {folder.map_file}" if whole else "the same command goes on with the others")
+    elif isinstance(command, Status):
+        finished = sum(folder.finished(cell) for cell in cells)
+        written = "is" if folder.map_file.is_file() else "is not"
+        say(f"{finished} of {len(cells)} cells are finished, the map {written} written")
+    elif isinstance(command, Show):
+        _show(DialOutcomes(folder.read()), say)
+    else:
+        chosen = random.Random(command.random_seed).sample(cells, min(command.random, len(cells)))
+        wrong = wrong_cells(folder, cells=chosen, epochs=command.epochs)
+        for cell in chosen:
+            say(f"{'WRONG' if cell.id in wrong else 'ok':5} {cell.id}")
+        return 1 if wrong else 0
+    return 0
+
+
+def _show(outcomes: DialOutcomes, say: Any) -> None:
+    findings = outcomes.findings
+    for finding in findings:
+        knobs = finding.setting
+        guesses = ", ".join(f"{m}: {finding.predicted[m]} ({finding.score(m)})" for m in MODELS)
+        say(
+            f"f={knobs.fraction:g} cost={knobs.cost} A={knobs.dims} {' − '.join(finding.comparison)} "
+            f"{finding.endpoint}: {spoken(finding.found, 3)} {finding.kind}; {guesses}"
+        )
+    for model in MODELS:
+        counts = tally(findings, model)
+        say(f"{model}: " + ", ".join(f"{counts[score]} {score}" for score in ("right", "wrong", "undecided")))
+    guess, right = constant_guess(findings)
+    say(f"best constant guess, {guess}: {right} right")
