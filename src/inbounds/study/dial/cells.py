@@ -79,6 +79,7 @@ class DialCell:
             policy=PolicyConfig(family, state_dependent_std=state_dependent, initial_std=INITIAL_STD),
             network=NetworkConfig(hidden_sizes=(32, 32)),
             normalize_obs=False,
+            engine="autograd",
             action_mode="raw" if self.task.charged == "raw" else "clip",
         )
 

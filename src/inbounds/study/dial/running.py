@@ -64,7 +64,7 @@ class DialFolder:
         if not path.is_file():
             return False
         stored = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
-        return stored["config"] == plain(cell)
+        return is_of(cell, stored["config"])
 
     def read(self) -> pa.Table:
         """Read the map, after comparing it with its checksum.
@@ -88,6 +88,12 @@ def plain(cell: DialCell) -> dict[str, Any]:
     task = vars(cell.task)
     found: dict[str, Any] = json.loads(json.dumps({**describe(cell.config), "task": task}))
     return found
+
+
+def is_of(cell: DialCell, stored: dict[str, Any]) -> bool:
+    """Whether a stored `plain` is a cell's; an option that is not named there had its default."""
+    config = {name: value for name, value in stored.items() if name != "task"}
+    return stored["task"] == vars(cell.task) and not changed_fields(cell.config, config)
 
 
 def run_cell(cell: DialCell) -> pa.Table:
@@ -199,7 +205,6 @@ def wrong_cells(folder: DialFolder, *, cells: Sequence[DialCell], epochs: int = 
         score = stored["score"].to_numpy()[rows][: epochs * len(cell.seeds)]
         again = run_cell(DialCell(cell.policy, cell.fraction, cell.cost, cell.dims, epochs=epochs))
         same = np.allclose(score, again["score"].to_numpy(), atol=1e-3, equal_nan=True)
-        config = {k: v for k, v in configs[cell.id].items() if k != "task"}
-        if not same or changed_fields(cell.config, config):
+        if not same or not is_of(cell, configs[cell.id]):
             wrong.append(cell.id)
     return wrong
