@@ -46,6 +46,11 @@ def jacobian_too(action, loc, log_scale, low, high):
             lambda a, m, s, lo, hi: gaussian_score(np.log(a / (1 - a)), m, s),
             "forgets the box",
         ),
+        (
+            "squashed_score",
+            lambda a, m, s, lo, hi: gaussian_score(2 * np.arctanh(a), m, s),
+            "on [−1, 1] only",
+        ),
         ("squashed_score", lambda *a: score(*a) / [1.0, np.exp(a[2])], "not log σ"),
         ("squashed_score", lambda *a: -score(*a), "sign"),
         ("squashed_score", jacobian_too, "does not belong"),

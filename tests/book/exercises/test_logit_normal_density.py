@@ -61,6 +61,7 @@ RIGHT = {"log_prob_from_latent": log_prob, "entropy_by_quadrature": entropy}
         ("entropy_by_quadrature", lambda m, s, lo, hi: stats.norm.entropy(m, s), "Gaussian's entropy"),
         ("entropy_by_quadrature", lambda m, s, lo, hi: entropy(m, s, lo, hi) - math.log(hi - lo), "length"),
         ("entropy_by_quadrature", lambda *a: -entropy(*a), "sign"),
+        ("entropy_by_quadrature", lambda *a: entropy(*a) + 1e-3, "samples give no more"),
         ("entropy_by_quadrature", colleagues_entropy, "both errors"),
         (
             "entropy_by_quadrature",

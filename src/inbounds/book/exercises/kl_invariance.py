@@ -36,6 +36,9 @@ def squashed_score(function: Callable[..., Any]) -> Judgement:
             "that is the score at logit(action), which forgets the box: rescale to (0, 1) first": score(
                 float(logit(action)) if 0 < action < 1 else np.nan
             ),
+            "2 artanh(action) is the latent on [−1, 1] only: rescale this box to (0, 1), then take the logit": score(
+                float(2 * np.arctanh(action)) if abs(action) < 1 else np.nan
+            ),
             "the derivative is with respect to σ, not log σ: multiply it by σ": right / [1.0, scale],
             "the sign is wrong: that is the gradient of minus the log-density": -right,
             "the Jacobian's slope does not belong there: it does not contain the parameters": right + slope,
