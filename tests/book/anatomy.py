@@ -27,7 +27,7 @@ CORE = (
 )
 DIFFICULTY = re.compile(r" \(\d+ min, (?:easy|medium|hard)\)$")
 BACK = re.compile(r"\A# [^\n]+\n+\*Going deeper, from \{doc\}`(?:[^`<]*<)?([\w-]+)>?`\.\*")
-SHOWS = re.compile(r"\b(?:show_films|figures\.show)\(")
+SHOWS = re.compile(r"\b(?:show_films|figures\.show|study_pages\.films(?:_of)?)\(")
 
 
 def cells_of(path: Path) -> list[nbformat.NotebookNode]:

@@ -27,6 +27,7 @@ from tests.book.exercises import (
     test_logit_normal_moments,
     test_six_untrained_robots,
     test_tanh_gaussian,
+    test_policy_that_learns,
     test_trpo,
     test_update_without_autograd,
 )
@@ -54,6 +55,7 @@ RIGHT = [
         "six_untrained_robots": test_six_untrained_robots.RIGHT,
         "tanh_gaussian": test_tanh_gaussian.RIGHT,
         "update_without_autograd": test_update_without_autograd.RIGHT,
+        "policy_that_learns": test_policy_that_learns.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
     }.items()
     for name, right in answers.items()
