@@ -1,4 +1,4 @@
-"""The directive ``{program}``: a chapter's program as one file, to download, and its listing, folded.
+"""The directive ``{program-listing}``: a chapter's program as one file, to download, and its listing, folded.
 
 It is assembled from the cells of the page on which the directive stands (`inbounds.book.pages.programs`), so that
 nothing of it stands twice; the files lie in ``_static/programs``.
@@ -50,6 +50,6 @@ def write_programs(app: Sphinx, exception: Exception | None) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directive (called by Sphinx)."""
-    app.add_directive("program", Program)
+    app.add_directive("program-listing", Program)
     app.connect("build-finished", write_programs)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

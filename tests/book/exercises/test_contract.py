@@ -25,9 +25,9 @@ from tests.book.exercises import (
     test_kl_invariance,
     test_logit_normal_density,
     test_logit_normal_moments,
+    test_policy_that_learns,
     test_six_untrained_robots,
     test_tanh_gaussian,
-    test_policy_that_learns,
     test_trpo,
     test_update_without_autograd,
 )
