@@ -9,6 +9,7 @@ Everything is imported where it is used: a contestant may live in an environment
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 import importlib.util
 import os
 import runpy
@@ -183,9 +184,13 @@ def rltools(work: Work) -> Turn:
     """RLtools' PPO (Eschmann et al.), C++ that its own interface compiles for these shapes, with Gymnasium's robot.
 
     Its interface trains one seed. Its observations are normalised, in C++; it evaluates nothing, and writes nothing.
+    Without MKL it multiplies by loops of its own, and is several times as slow: it does not take part then.
     """
     import gymnasium
     from rltools import PPO
+
+    for package in ("mkl", "mkl-include"):
+        importlib.metadata.version(package)  # raises an ImportError where it is missing
 
     hidden, depth = work.hidden[0], len(work.hidden) + 1
     shape: dict[str, Any] = {}

@@ -150,7 +150,7 @@ def how(results: Mapping[str, Any]) -> list[str]:
     lines.append(
         "* What a turn holds beside training: ours a checkpoint, episode statistics and diagnostics; "
         "stable-baselines3's and SBX's episode statistics and a logger; CleanRL's the numbers of its summary; RLtools' "
-        "none of these. RLtools multiplies by its own loops where it finds neither MKL nor a system's BLAS."
+        "none of these. RLtools trains one seed, and multiplies by MKL."
     )
     lines += [f"* Not measured: {name} ({why})." for name, why in results["unavailable"].items()]
     return lines

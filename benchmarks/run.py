@@ -40,6 +40,7 @@ PACKAGES = (
     "jax",
     "cleanrl",
     "rltools",
+    "mkl",
     "numba",
 )
 EXAMPLES = """
@@ -47,15 +48,14 @@ examples:
   python -m benchmarks.run                                        everything; about twenty-five minutes
   python -m benchmarks.run --quick                                does it run? about a minute
   python -m benchmarks.run --envs Hopper-v5 --contestants inbounds-ppo-10 sb3-ppo floor
-  python -m benchmarks.run --python sbx-ppo=peers/bin/python --python cleanrl-ppo=peers/bin/python
+  python -m benchmarks.run $(for who in sbx cleanrl rltools; do echo --python $who-ppo=peers/bin/python; done)
 
 peers of another stack:
-  RLtools is in the extra `bench`, and compiles itself with g++ or clang++, a minute for each robot; without them it
-  sits out.
-  SBX needs JAX. CleanRL's wheel asks for an older Python than it needs, and for older libraries. Give them an
+  SBX needs JAX. RLtools compiles itself with g++ or clang++, a minute for each robot, and is several times as fast with
+  MKL as without. CleanRL's wheel asks for an older Python than it needs, and for older libraries. Give them an
   environment of their own, with the versions of gymnasium, mujoco and torch that stand in constraints.txt:
     python -m venv peers
-    peers/bin/pip install -c constraints.txt sbx-rl "gymnasium[mujoco]" torch
+    peers/bin/pip install -c constraints.txt sbx-rl "gymnasium[mujoco]" torch rltools mkl mkl-include
     peers/bin/pip install --no-deps --ignore-requires-python cleanrl==1.2.0
 """
 
