@@ -99,7 +99,16 @@ def test_a_folder_of_the_engine_has_at_most_a_dozen_entries(room: str) -> None:
     ],
 )
 def test_importing_is_light(statement: str) -> None:
-    heavy = ["IPython", "jupyter_book", "jupyter_core", "ipykernel", "bokeh", "mediapy", "matplotlib"]
+    heavy = [
+        "IPython",
+        "jupyter_book",
+        "jupyter_core",
+        "ipykernel",
+        "bokeh",
+        "mediapy",
+        "matplotlib",
+        "numba",
+    ]
     code = f"{statement}; import sys; print(*[m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""

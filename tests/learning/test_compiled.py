@@ -9,6 +9,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+import threadpoolctl
 import torch
 
 from inbounds.learning import DivergedSeedWarning, PPOConfig, TrainConfig, Trainer, ppo, train
@@ -217,6 +218,15 @@ def test_a_family_without_kernels_refuses(monkeypatch: pytest.MonkeyPatch) -> No
 def test_an_engine_of_another_name_is_refused() -> None:
     with pytest.raises(ValueError, match="engine must be autograd or compiled, got 'torch'"):
         dataclasses.replace(small_config(), engine="torch")
+
+
+def test_every_matrix_library_has_one_thread() -> None:
+    """Also the one that numba's products call, which is loaded by then; torch's setting reaches neither."""
+    small_run(compiled(small_config(epochs=1)))
+    with compiled_engine(ALL_FAMILIES["beta"]).one_blas_thread():
+        libraries = [one for one in threadpoolctl.threadpool_info() if one["user_api"] == "blas"]
+        assert any("scipy" in one["filepath"] for one in libraries)
+        assert {one["num_threads"] for one in libraries} == {1}
 
 
 def test_preparing_compiles_what_a_run_calls() -> None:
