@@ -15,8 +15,8 @@ from pathlib import Path
 import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
-QUOTED = re.compile(r"\{glue:?\w*\}`(?:([^`:]+\.ipynb)::)?([^`:]+)")
-"""The notebook, where it is another one, and the name in a glue role of MyST."""
+QUOTED = re.compile(r"\{glue:?\w*\}`(?:([^`:]+\.ipynb)::)?([^`:]+)(?::([^`]*))?`")
+"""The notebook, where it is another one, the name and the format in a glue role of MyST."""
 LIGHT = ("text/plain", "application/papermill.record/text/plain")
 METADATA = {
     "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
@@ -63,10 +63,12 @@ def lines_beside_imports(source: str) -> int:
     return len(source.splitlines()) - sum((node.end_lineno or 0) - node.lineno + 1 for node in imports)
 
 
-def glued(notebook: nbformat.NotebookNode) -> set[str]:
-    """The names of all values that a notebook glues."""
+def glued(notebook: nbformat.NotebookNode) -> dict[str, str]:
+    """All values that a notebook glues, as it stores them, by name."""
     return {
-        output.metadata["scrapbook"]["name"]
+        output.metadata["scrapbook"]["name"]: "".join(
+            output.data.get(LIGHT[0], output.data.get(LIGHT[1], ""))
+        )
         for cell in notebook.cells
         for output in cell.get("outputs", [])
         if "scrapbook" in output.get("metadata", {})
@@ -77,13 +79,25 @@ def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
     """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
     known, found = {"": glued(notebook)}, []
     for number, cell in enumerate(notebook.cells):
-        for other, name in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
+        for other, name, how in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
             if other not in known:
                 known[other] = glued(nbformat.read(ROOT / "notebooks" / other, 4))
             if name not in known[other]:
                 said = f" of {other}" if other else ""
                 found.append(f"cell {number}: quotes {name!r}, which no cell{said} glues")
+            elif how and not is_number(known[other][name]):
+                value = known[other][name]
+                found.append(f"cell {number}: formats {name!r}, which is no plain number: {value[:40]}")
     return found
+
+
+def is_number(text: str) -> bool:
+    """Whether a stored value can be formatted: the build reads it as text, and ``np.float64(1.5)`` is none."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def main(arguments: list[str] | None = None) -> int:

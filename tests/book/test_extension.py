@@ -116,3 +116,26 @@ def test_a_page_says_its_kind_and_its_minutes(tmp_path: Path, page: str, label: 
         assert "</h1>\n<p class" in context["body"]
         assert label in context["body"]
         assert "about 2 minutes of reading" in context["body"]
+
+
+def test_programs_are_written_beside_the_pages(tmp_path: Path) -> None:
+    """Each page with a program has its file, the others have none."""
+    notebooks = tmp_path / "src" / "notebooks"
+    notebooks.mkdir(parents=True)
+    for name, tags in (("with_one", ["program"]), ("without", [])):
+        cells = [
+            {"cell_type": "markdown", "source": ["# A title\n", "\n", "Text."], "metadata": {}},
+            {"cell_type": "code", "source": ["x = 1"], "metadata": {"tags": tags}},
+        ]
+        (notebooks / f"{name}.ipynb").write_text(json.dumps({"cells": cells}))
+    app = SimpleNamespace(
+        srcdir=tmp_path / "src",
+        outdir=tmp_path / "html",
+        builder=SimpleNamespace(format="html"),
+        env=SimpleNamespace(found_docs={"notebooks/with_one", "notebooks/without", "book/api"}),
+    )
+    load("program").write_programs(app, None)
+    (written,) = (tmp_path / "html" / "_static" / "programs").iterdir()
+    assert written.name == "with_one.py"
+    assert written.read_text().startswith('"""A title: the program')
+    assert "\nx = 1\n" in written.read_text()

@@ -198,6 +198,14 @@ def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
     assert nbval(tmp_path, "--cell-timeout=30").returncode != 0  # nbval waits for it as long as for any cell
 
 
+def quote(cell: nbformat.NotebookNode, value: str) -> None:
+    """Let a cell glue a value, and quote it with a format in the cell that it was copied from."""
+    cell.source, cell.execution_count = "glue('answer', answer, display=False)", 1
+    shown = nbformat.v4.new_output("display_data", data={"text/plain": value})
+    shown.metadata = {"scrapbook": {"name": "answer"}}
+    cell.outputs = [shown]
+
+
 @pytest.mark.parametrize(
     ("plant", "complaint"),
     [
@@ -225,11 +233,14 @@ def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
             ),
             "quotes 'answer', which no cell glues",
         ),
+        (lambda cell: quote(cell, "np.float64(42.0)"), "formats 'answer', which is no plain number"),
     ],
 )
 def test_the_hook_sees(tmp_path: Path, plant, complaint: str, capsys: pytest.CaptureFixture) -> None:
     notebook = small_notebook(tmp_path)
     plant(notebook.cells[1])
+    if "formats" in complaint:
+        notebook.cells[0].source = "# A chapter\n\n{glue:text}`answer:.0f`"
     nbformat.write(notebook, tmp_path / "chapter.ipynb")
     assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == 1
     assert complaint in capsys.readouterr().out
