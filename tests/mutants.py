@@ -860,8 +860,22 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/learning/test_compiled.py::test_what_is_kept_is_not_found_after_a_change_of_what_it_calls",
     ),
     Mutant(
+        "a p-value of 0.05 is called below 0.05",
+        "study/second/primary.py",
+        "if p_adjusted < SIGNIFICANCE:",
+        "if p_adjusted <= SIGNIFICANCE:",
+        "tests/study/second/test_analysis.py::test_findings",
+    ),
+    Mutant(
+        "intervals of the primary comparison are not expanded",
+        "study/second/primary.py",
+        'statistic="mean", resamples=RESAMPLES',
+        'statistic="mean", method="percentile", resamples=RESAMPLES',
+        "tests/study/second/test_independent.py::test_the_primary_comparison",
+    ),
+    Mutant(
         "the digest of a cell forgets the compiled engine",
-        "study/grid.py",
+        "study/cell.py",
         'if config.engine == "autograd":',
         "if config.engine:",
         "tests/study/test_grid.py::test_autograds_digests_are_those_of_the_first_study",
