@@ -93,11 +93,6 @@ class Runs:
     saturation: Array
     """`[seeds]`: share of the executed actions at a bound in the first epoch."""
 
-    @property
-    def all_returned(self) -> bool:
-        """Whether every seed has a return at all."""
-        return not bool(np.isnan(self.returns).all(1).any())
-
     def endpoint(self, name: str) -> Array:
         """Return the final return or the area of each seed; NaN for one that never had a return."""
         filled = repeated(self.returns)
@@ -223,7 +218,7 @@ def primary(
             share, replicates = expanded_share(x, y), bootstrap_difference(x, y, rng, resamples)
             low, high = np.quantile(replicates, [share, 1 - share])
             row = replace(row, difference=x.mean() - y.mean(), share=share, low=low, high=high)
-        if all(side is not None and side.seeds == TWENTY and side.all_returned for side in sides):
+        if all(side is not None and side.seeds == TWENTY for side in sides):
             row = replace(row, p=permutation_p(x, y, rng, permutations))
         rows.append(row)
     adjusted = holm(np.array([row.p for row in rows]))

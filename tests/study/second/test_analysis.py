@@ -102,13 +102,14 @@ def test_a_verdict_waits_for_all_twenty_seeds(tmp_path) -> None:
     write_cells(folder, ten)
     outcomes = Outcomes.read(folder, second_cells())
     rows = [row for row in second.primary(outcomes) if row.robot == "Hopper"]
-    assert all(row.difference.n == 10 and not row.finding for row in rows)
+    assert all(row.difference.n == 10 and not row.finding and np.isnan(row.p_value) for row in rows)
     write_cells(folder, [c for c in SECOND["B, more seeds"] if c.robot == "Hopper"])
     outcomes = Outcomes.read(folder, second_cells())
     rows = second.primary(outcomes)
     here = [row for row in rows if row.robot == "Hopper"]
     assert all(row.difference.n == 20 and row.finding for row in here)
     assert all(row.difference is None and not row.finding for row in rows if row.robot != "Hopper")
+    assert all(np.isnan(row.p_adjusted) for row in rows if row.robot != "Hopper")
     assert min(row.p_adjusted for row in here) >= 24 / (PERMUTATIONS + 1) * 0.99  # all 24 keep their place
     column = Column("equal", "ppo", "beta")
     assert pooled_scores(outcomes, column, "Hopper", "final").shape == (20,)
@@ -123,6 +124,10 @@ def test_doing_nothing_scores_nought(tmp_path) -> None:
     folder = folder_in(tmp_path)
     column = Column("equal", "ppo", "beta")
     write_cells(folder, [c for c in SECOND["B"] if c.family == "beta"])
+    ten = Outcomes.read(folder, second_cells())
+    assert second.normalized(ten, column, "final") is None  # the other ten seeds are planned, too
+    assert second.aggregate(ten, column, "final") is None
+    write_cells(folder, [c for c in SECOND["B, more seeds"] if c.family == "beta"])
     found = second.normalized(Outcomes.read(folder, second_cells()), column, "final")
     raw = pooled_scores(Outcomes.read(folder, second_cells()), column, "Ant", "final")
     assert found is not None

@@ -18,7 +18,16 @@ from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
 from inbounds.study.grid import ROBOTS, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
-from inbounds.study.second import PrimaryRow, engines_agree, primary, secondary, starts
+from inbounds.study.second import (
+    GAUSSIAN,
+    PrimaryRow,
+    aggregate,
+    engines_agree,
+    improvement,
+    primary,
+    secondary,
+    starts,
+)
 from inbounds.study.second.primary import BOUNDED
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import p_value, percent, spoken, verdict
@@ -138,6 +147,24 @@ def forest(rows: Sequence[PrimaryRow]) -> Figure:
     return fig
 
 
+def over_robots(outcomes: Outcomes) -> Shown:
+    """Return the primary columns over all robots, where they are complete."""
+    found, rows = _second(outcomes), []
+    for law in ("gaussian", *BOUNDED):
+        column = GAUSSIAN if law == "gaussian" else Column("equal", "ppo", law)
+        for endpoint, name in ENDPOINTS.items():
+            iqm, better = aggregate(found, column, endpoint), improvement(found, column, endpoint)
+            if iqm is not None:
+                beats = "" if law == "gaussian" else spoken(better, 2)
+                rows.append([column_name(column), name, spoken(iqm, 2), beats])
+    if not rows:
+        missing = html.missing("missing: no primary column is complete on all six robots.")
+        return html.of_study("the primary columns over all robots", missing)
+    head = ["column", "endpoint", "IQM", "probability of beating the Gaussian"]
+    caption = "Over all robots: doing nothing scores 0, the first study's best final return 1."
+    return html.of_study("the primary columns over all robots", html.table(caption, head, rows, words=(0, 1)))
+
+
 def equal_starts(outcomes: Outcomes) -> Shown:
     """Return the manipulation check: what each column does before training, and whether the start is equal."""
     found = _second(outcomes)
@@ -231,6 +258,7 @@ def second_study(outcomes: Outcomes) -> Iterator[str]:
     for title, view in (
         ("Finished cells", progress),
         ("Primary comparison", primary_comparison),
+        ("Over all robots", over_robots),
         ("Before training", equal_starts),
         ("The two engines", engine_check),
         ("Secondary comparisons", secondary_comparisons),

@@ -4,6 +4,7 @@ outcomes = Outcomes.read(StudyFolder(), second_cells())
 rows = primary(outcomes)
 """
 
+from inbounds.study.second.over_robots import aggregate, improvement
 from inbounds.study.second.primary import GAUSSIAN, PrimaryRow, primary
 from inbounds.study.second.secondary import PAIRS, SecondaryRow, engines_agree, secondary, starts
 from inbounds.study.second.yardsticks import BEST, DO_NOTHING, MARGINS, normalized
@@ -16,7 +17,9 @@ __all__ = [
     "PAIRS",
     "PrimaryRow",
     "SecondaryRow",
+    "aggregate",
     "engines_agree",
+    "improvement",
     "normalized",
     "primary",
     "secondary",

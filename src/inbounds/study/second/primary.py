@@ -56,7 +56,7 @@ class PrimaryRow:
     difference: Estimate | None
     """Bounded law minus Gaussian with a free σ."""
     p_value: float
-    """Of equal means."""
+    """Of equal means; NaN while seeds are missing."""
     p_adjusted: float
     """The same after Holm's correction over all 24."""
     margin: float
@@ -141,17 +141,16 @@ def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[Prima
         gap(outcomes, _column(law), GAUSSIAN, robot, endpoint, without_diverged=without_diverged)
         for law, endpoint, robot in places
     ]
-    adjusted = statistics.holm([each.p_value for each in gaps])
+    whole = [
+        all(is_whole(outcomes, column, robot) for column in (_column(law), GAUSSIAN))
+        for law, _, robot in places
+    ]
+    # A test of which seeds are still to be run keeps its place in the correction, as one that was not run.
+    p_values = [each.p_value if done else float("nan") for each, done in zip(gaps, whole, strict=True)]
+    adjusted = statistics.holm(p_values)
     return [
-        PrimaryRow(
-            *place,
-            each.difference,
-            each.p_value,
-            float(p),
-            MARGINS[place[1]][place[2]],
-            all(is_whole(outcomes, column, place[2]) for column in (_column(place[0]), GAUSSIAN)),
-        )
-        for place, each, p in zip(places, gaps, adjusted, strict=True)
+        PrimaryRow(*place, each.difference, p_value, float(p), MARGINS[place[1]][place[2]], done)
+        for place, each, p_value, p, done in zip(places, gaps, p_values, adjusted, whole, strict=True)
     ]
 
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from inbounds.study import statistics
 from inbounds.study.cell import ROBOTS
 from inbounds.study.outcomes import Column, Floats, Outcomes
-from inbounds.study.second.pooled import scores_by_robot
+from inbounds.study.second.pooled import is_whole, scores_by_robot
 
 ENDPOINTS: Mapping[str, str] = MappingProxyType(
     {"final": "final return", "area": "area under the learning curve"}
@@ -53,7 +53,7 @@ def normalized(outcomes: Outcomes, column: Column, endpoint: str) -> dict[str, F
         endpoint: a key of `ENDPOINTS`, or "greedy"; all are normalised by the same two numbers.
 
     Returns:
-        `[S]` by robot; None unless the column is complete on all six.
+        `[S]` by robot; None unless all planned seeds of the column are finished on all six.
 
     Example:
         >>> from inbounds.study import StudyFolder
@@ -62,7 +62,7 @@ def normalized(outcomes: Outcomes, column: Column, endpoint: str) -> dict[str, F
         True
     """
     raw = scores_by_robot(outcomes, column, endpoint)
-    if raw.keys() < set(ROBOTS):
+    if raw.keys() < set(ROBOTS) or not all(is_whole(outcomes, column, robot) for robot in ROBOTS):
         return None
     best = BEST["final"]
     return {
