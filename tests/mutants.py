@@ -701,8 +701,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "the starts' generator draws the sampled actions",
         "study/running/evaluate.py",
-        "[generator_of(seed, _FINAL + 1) for seed in seeds]",
-        "[generator_of(seed, _FINAL) for seed in seeds]",
+        "[generator_of(seed, FINAL + 1) for seed in seeds]",
+        "[generator_of(seed, FINAL) for seed in seeds]",
         "tests/study/running/test_one_cell.py::test_sampled_actions_are_not_drawn_by_what_drew_their_starts",
     ),
     Mutant(

@@ -1,4 +1,4 @@
-"""`inbounds study run | resume | status | report | ledger | verify`: what the words of the command line do."""
+"""`inbounds study run | resume | status | evaluate | report | ledger | verify`: what the words of the command line do."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from inbounds.study.outcomes import Outcomes
 from inbounds.study.running.attempts import Settings
 from inbounds.study.running.many_cells import run_study
 from inbounds.study.running.one_cell import StudyError
+from inbounds.study.running.play_ways import evaluate_cells
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
 from inbounds.study.running.verify import Checked, verify
 from inbounds.study.store import StudyFolder
@@ -77,6 +78,14 @@ class Status(_WhereAll):
 
 
 @dataclass(frozen=True)
+class Evaluate(_WhereAll):
+    """Play the shipped policies by every way to act: mean, median, mode, sample, and each action snapped to a bound.
+
+    What has been played stays; the same command goes on with the others.
+    """
+
+
+@dataclass(frozen=True)
 class Report(_Where):
     """Write an HTML page of figures and tables of all finished cells; what is missing is called missing."""
 
@@ -110,11 +119,12 @@ class Verify(_WhereAll):
     """Of that choice."""
 
 
-StudyCommand: TypeAlias = Run | Resume | Status | Report | Ledger | Verify
+StudyCommand: TypeAlias = Run | Resume | Status | Evaluate | Report | Ledger | Verify
 COMMANDS: dict[str, type[StudyCommand]] = {
     "run": Run,
     "resume": Resume,
     "status": Status,
+    "evaluate": Evaluate,
     "report": Report,
     "ledger": Ledger,
     "verify": Verify,
@@ -160,7 +170,7 @@ def study(args: Sequence[str]) -> int:
             prog="inbounds study",
             description=description,
         )
-        if isinstance(command, Ledger | Verify | Report) and not command.results.is_dir():
+        if isinstance(command, Ledger | Verify | Report | Evaluate) and not command.results.is_dir():
             raise ValueError(_no_folder(command.results))
         if isinstance(command, Ledger):
             return _ledger(command, console)
@@ -169,6 +179,8 @@ def study(args: Sequence[str]) -> int:
             return _run(command, cells, console)
         if isinstance(command, Status):
             return _status(command, cells, console)
+        if isinstance(command, Evaluate):
+            return _evaluate(command, cells, console)
         if isinstance(command, Report):
             return _report(command, cells, console)
         return _verify(command, cells, console)
@@ -200,6 +212,14 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
         console.print(status_table(cells, command.folder()))
         if not command.results.is_dir():
             console.print(_no_folder(command.results), markup=False, soft_wrap=True)
+    return 0
+
+
+def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Console) -> int:
+    played = evaluate_cells(
+        cells, command.folder(), lambda line: console.print(line, markup=False, soft_wrap=True)
+    )
+    console.print(f"{len(played)} cells played now", markup=False)
     return 0
 
 

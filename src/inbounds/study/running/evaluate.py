@@ -18,7 +18,8 @@ from inbounds.learning import Trainer
 from inbounds.learning.training import Environments, make_environments, one_thread
 
 _STREAM = 4  # spawn keys below it are training's
-_FINAL = 2**31  # in the place of an epoch: the evaluation of the finished policies
+FINAL = 2**31
+"""In the place of an epoch: the evaluation of the finished policies."""
 FINAL_EPISODES = 10
 GREEDY = "median"  # how policies act while they are trained
 
@@ -137,11 +138,11 @@ def evaluate_finally(trainer: Trainer, episodes: int = FINAL_EPISODES) -> list[d
     """
     seeds, players = trainer.config.seeds, Players(trainer, episodes)
     starts = [
-        int(start) for seed in seeds for start in generator_of(seed, _FINAL).integers(2**31, size=episodes)
+        int(start) for seed in seeds for start in generator_of(seed, FINAL).integers(2**31, size=episodes)
     ]
     rows = []
     for way in (*trainer.networks.policy.family.greedy, "sample"):
-        returns, lengths = players.play(way, starts, [generator_of(seed, _FINAL + 1) for seed in seeds])
+        returns, lengths = players.play(way, starts, [generator_of(seed, FINAL + 1) for seed in seeds])
         rows += [
             {"seed": seed, "greedy": way, "episode": e, "return": returns[s, e], "length": int(lengths[s, e])}
             for s, seed in enumerate(seeds)

@@ -242,5 +242,8 @@ def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, A
 
 def _data_files(results: Path) -> list[Path]:
     return [
-        path for part in ("cells", "policies") for path in (results / part).glob("[!.]*") if path.is_file()
+        path
+        for part in ("cells", "policies", "evaluations")
+        for path in (results / part).glob("[!.]*")
+        if path.is_file()
     ]
