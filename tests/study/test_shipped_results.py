@@ -11,8 +11,10 @@ import pytest
 
 from inbounds.study import StudyFolder, all_cells
 from inbounds.study.cell import STUDY_VERSION
+from inbounds.study.running.check_ways import check_replay, wrong_evaluation
 from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
-from inbounds.study.store import COLUMNS
+from inbounds.study.store import COLUMNS, read_cell
+from inbounds.study.ways_played import EPISODES, evaluated, read_nothing, read_ways
 
 ROOT = Path(__file__).parents[2]
 RESULTS = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
@@ -70,3 +72,39 @@ def test_the_changelog_names_every_later_version_of_the_study() -> None:
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf8")
     for version in range(2, STUDY_VERSION + 1):
         assert f"study version {version}" in changelog
+
+
+def test_every_shipped_policy_has_been_played_or_is_new() -> None:
+    """A cell that arrives is played by `inbounds study evaluate`; whatever has been played is of the policies beside it."""
+    played = evaluated(RESULTS, CELLS)
+    assert len(played) >= 56
+    assert [said for cell in played if (said := wrong_evaluation(cell, RESULTS))] == []
+    assert {path.stem for path in (RESULTS.results / "evaluations").glob("*.parquet")} == {
+        "nothing",
+        *(cell.id for cell in played),
+    }
+    assert {robot: returns.shape for robot, returns in read_nothing(RESULTS).items()} == {
+        robot: (10, episodes) for robot, episodes in EPISODES.items()
+    }
+
+
+def test_the_evaluations_repeat_the_returns_of_the_final_policies() -> None:
+    """Two programs, written at different times, from the same starts: on robots with ten episodes, bit for bit."""
+    compared = 0
+    for cell in evaluated(RESULTS, CELLS):
+        if EPISODES[cell.robot] < 10:
+            continue
+        rows = read_cell(RESULTS.policy_files(cell)[1]).to_pylist()
+        for way, played in read_ways(RESULTS, cell).items():
+            stored = [row["return"] for row in rows if row["greedy"] == way]
+            if stored:
+                assert played.returns.ravel().tolist() == stored, (cell.id, way)
+                compared += 1
+    assert compared > 100
+
+
+@pytest.mark.slow
+def test_a_shipped_evaluation_can_be_remade() -> None:
+    cell = next(cell for cell in CELLS if cell.id == "standard-hopper-ppo-logit-normal")
+    finding = check_replay(cell, RESULTS)
+    assert finding.ok, finding.message

@@ -1,4 +1,4 @@
-"""`inbounds study run | resume | status | evaluate | report | ledger | verify`: what the words of the command line do."""
+"""`inbounds study run | resume | status | evaluate | report | ledger | verify`: what the words of the CLI do."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import claims_named, judge
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running.attempts import Settings
+from inbounds.study.running.check_ways import check_ways
 from inbounds.study.running.many_cells import run_study
 from inbounds.study.running.one_cell import StudyError
 from inbounds.study.running.play_ways import evaluate_cells
@@ -107,7 +108,7 @@ class Ledger:
 
 @dataclass(frozen=True)
 class Verify(_WhereAll):
-    """Check the sums of all results, and run the first epochs of some cells again."""
+    """Check the sums of all results, run the first epochs of some cells and play some policies again."""
 
     epochs: int = 2
     """To run again."""
@@ -270,6 +271,8 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
         chooser = random.Random(command.random_seed)
         rerun = tuple(chooser.sample(finished, min(command.random, len(finished))))
     findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
+    if rerun is None:
+        findings += check_ways(cells, command.folder(), show)
     return 0 if all(finding.ok for finding in findings) else 1
 
 

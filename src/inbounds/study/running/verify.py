@@ -187,7 +187,7 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
         run.epoch()
     run.close()
     here, there = provenance(), metadata["sessions"][0]
-    if not _same_arithmetic(here, there, cell.engine):
+    if not same_arithmetic(here, there, cell.engine):
         return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)
     mismatch = first_mismatch(rows.filter(pc.less(rows["epoch"], epochs)), run.table())
     if mismatch:
@@ -199,7 +199,7 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
     return Checked(cell.id, True, f"{epochs} epochs repeated exactly")
 
 
-def _same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any], engine: str) -> bool:
+def same_arithmetic(here: Mapping[str, Any], there: Mapping[str, Any], engine: str = "autograd") -> bool:
     """Return whether two processes have processor and wheels in common, and so compute the same bits with an engine."""
     wheels = (*WHEELS, *COMPILERS) if engine == "compiled" else WHEELS
     noted = [name for name in wheels if name in there["versions"]]
