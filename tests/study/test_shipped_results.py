@@ -12,6 +12,7 @@ import pytest
 from inbounds.study import StudyFolder, all_cells
 from inbounds.study.cell import STUDY_VERSION
 from inbounds.study.running.check_ways import check_replay, wrong_evaluation
+from inbounds.study.running.play_records import RECORDS, read_records
 from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
 from inbounds.study.store import COLUMNS, read_cell
 from inbounds.study.ways_played import EPISODES, evaluated, read_nothing, read_ways
@@ -75,17 +76,22 @@ def test_the_changelog_names_every_later_version_of_the_study() -> None:
 
 
 def test_every_shipped_policy_has_been_played_or_is_new() -> None:
-    """A cell that arrives is played by `inbounds study evaluate`; whatever has been played is of the policies beside it."""
+    """A cell that arrives is played by `inbounds study evaluate`; what has been played is of the policies beside it."""
     played = evaluated(RESULTS, CELLS)
     assert len(played) >= 56
     assert [said for cell in played if (said := wrong_evaluation(cell, RESULTS))] == []
     assert {path.stem for path in (RESULTS.results / "evaluations").glob("*.parquet")} == {
         "nothing",
+        "records",
         *(cell.id for cell in played),
     }
     assert {robot: returns.shape for robot, returns in read_nothing(RESULTS).items()} == {
         robot: (10, episodes) for robot, episodes in EPISODES.items()
     }
+    mine = {cell.id for cell in played if cell.family == "logit-normal"}
+    records = read_records(RESULTS)
+    assert records.keys() == mine
+    assert all(kinds.keys() == RECORDS.keys() for kinds in records.values())
 
 
 def test_the_evaluations_repeat_the_returns_of_the_final_policies() -> None:

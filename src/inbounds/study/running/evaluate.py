@@ -88,16 +88,20 @@ class Players:
         return returns, lengths.reshape(shape)
 
     def _act(self, obs: NDArray[Any], way: str, generators: Sequence[np.random.Generator]) -> NDArray[Any]:
+        policy, outputs = self.trainer.networks.policy, self._outputs(obs)
+        if way == "sample":
+            return policy.sample(outputs.numpy(), generators, self.trainer.collector.action_mode)
+        return policy.greedy(outputs, way)
+
+    def _outputs(self, obs: NDArray[Any]) -> torch.Tensor:
+        """The networks' outputs `[S·E, 2A]` for observations `[S·E, O]`."""
         collector, networks = self.trainer.collector, self.trainer.networks
-        policy, normalizer = networks.policy, collector.normalizer
         by_seed = obs.reshape(-1, self.episodes, obs.shape[1]).swapaxes(
             0, 1
         )  # [E, S, O], as statistics broadcast
+        normalizer = collector.normalizer
         seen = by_seed.astype(collector.dtype) if normalizer is None else normalizer(by_seed)
-        outputs = networks.outputs(torch.from_numpy(seen.swapaxes(0, 1))).flatten(0, 1)  # [S·E, 2A]
-        if way == "sample":
-            return policy.sample(outputs.numpy(), generators, collector.action_mode)
-        return policy.greedy(outputs, way)
+        return networks.outputs(torch.from_numpy(seen.swapaxes(0, 1))).flatten(0, 1)
 
     def close(self) -> None:
         """Close the environments."""

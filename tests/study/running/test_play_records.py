@@ -1,0 +1,49 @@
+"""What records keep of trained policies' latents: against fifty digits, and never more than the record alone loses."""
+
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import torch
+
+from inbounds.study import run_cell
+from inbounds.study.running.play_records import RECORDS, publish_records, read_records, records_of
+from tests.study.running.test_play_ways import cell_of, short_episodes  # noqa: F401 (a fixture that applies itself)
+from tests.study.small import folder_in
+
+BITS = {"action, float64": 53, "action, float32": 24, "action, float16": 11, "action, bfloat16": 8}
+
+
+@pytest.mark.parametrize("name", BITS)
+def test_a_record_is_the_nearest_number_of_its_format(name: str) -> None:
+    mpmath.mp.dps = 50
+    for latent in (0.7, 3.1, 5.0, 9.5):
+        spacing = mpmath.mpf(2) ** -BITS[name]
+        k = int(mpmath.nint(2 / (1 + mpmath.exp(latent)) / spacing)) if latent > np.log(3) else None
+        found = RECORDS[name].recalled(torch.tensor([latent, -latent], dtype=torch.float64))  # type: ignore[union-attr]
+        assert found[0] == -found[1]
+        if k:
+            assert float(found[0]) == pytest.approx(
+                float(mpmath.log((2 - k * spacing) / (k * spacing))), rel=1e-8
+            )
+
+
+def test_what_is_lost_is_what_is_stored_as_the_bound() -> None:
+    latents = torch.tensor([18.0, 18.1, -18.1, 60.0], dtype=torch.float64)  # lost from 26 log 2 = 18.02 on
+    assert RECORDS["action, float32"].lost(latents) == 3  # type: ignore[union-attr]
+    assert RECORDS["action, float64"].lost(latents) == 1  # type: ignore[union-attr]
+
+
+def test_the_files_rows_are_the_policies(tmp_path: Path) -> None:
+    cell, folder = cell_of("logit-normal"), folder_in(tmp_path)
+    run_cell(cell, folder)
+    assert publish_records([cell, cell_of("gaussian")], folder)
+    assert not publish_records([cell], folder)
+    kinds = read_records(folder)[cell.id]
+    assert kinds.keys() == RECORDS.keys()
+    assert (kinds["latent, float32"]["worst"] == 0).all()  # a policy in float32 draws latents in float32
+    assert (kinds["action, bfloat16"]["wrong"] > kinds["action, float16"]["wrong"]).all()
+    rows = [row for row in records_of(cell, folder) if row["record"] == "action, bfloat16"]
+    assert [row["wrong"] for row in rows] == kinds["action, bfloat16"]["wrong"].tolist()
+    assert [row["steps"] for row in rows] == [40, 40]
