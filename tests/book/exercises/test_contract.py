@@ -28,6 +28,8 @@ from tests.book.exercises import (
     test_policy_that_learns,
     test_six_untrained_robots,
     test_tanh_gaussian,
+    test_storing_actions,
+    test_three_centres,
     test_trpo,
     test_update_without_autograd,
 )
@@ -56,6 +58,8 @@ RIGHT = [
         "tanh_gaussian": test_tanh_gaussian.RIGHT,
         "update_without_autograd": test_update_without_autograd.RIGHT,
         "policy_that_learns": test_policy_that_learns.RIGHT,
+        "storing_actions": test_storing_actions.RIGHT,
+        "three_centres": test_three_centres.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
     }.items()
     for name, right in answers.items()

@@ -1,4 +1,4 @@
-"""What another way to act than the median earns on the study's final policies: chapter 6's figure and its verdict.
+"""What another way to act than the median earns on the study's final policies: a figure, and its verdict in counts.
 
     rows = rows_of(study_pages.shipped())
     fig = draw(rows)
@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from inbounds.book.drawing.figures import LOOKS, WIDTH
 from inbounds.study.grid import ROBOTS, Cell
@@ -22,6 +24,8 @@ from inbounds.study.statistics import Estimate, difference
 
 BOUNDED: Mapping[str, str] = {"beta": "Beta", "logit-normal": "logit-normal"}
 """Families with three centres, and their names within a label."""
+NAMES: Mapping[str, str] = {"gaussian": "Gaussian", "clipped-gaussian": "clipped Gaussian", **BOUNDED}
+"""All families, likewise."""
 WAYS: Mapping[str, str] = {"mean": "mean", "mode": "mode", "sample": "noise kept"}
 """What is compared with the median, and its panel's title."""
 RESAMPLES = 100_000
@@ -83,30 +87,74 @@ def in_words(cell: Cell) -> str:
     """
     name, _, value = cell.variant.partition("gamma-")
     variant = f"γ = {value}" if value else name.replace("-", " ")
-    return ", ".join(filter(None, [cell.algorithm.upper(), BOUNDED[cell.family], variant]))
+    return ", ".join(filter(None, [cell.algorithm.upper(), NAMES[cell.family], variant]))
 
 
 def _gains(outcome: Outcome) -> dict[str, Estimate]:
-    unit = np.nanmean(np.abs(outcome.ways["median"])) / 100
-    return {
-        way: difference(
-            outcome.ways[way] / unit,
-            outcome.ways["median"] / unit,
-            np.random.default_rng(0),
-            statistic="mean",
-            paired=True,
-            resamples=RESAMPLES,
-            missing="exclude",
-        )
-        for way in WAYS
-    }
+    return {way: gain(outcome.ways[way], outcome.ways["median"]) for way in WAYS}
 
 
-def draw(rows: Sequence[Row]) -> Figure:
+def gain(returns: NDArray[np.float64], median: NDArray[np.float64]) -> Estimate:
+    """Return what a way to act earns less the median, in percent of the median's return: a mean over seeds.
+
+    Args:
+        returns: `[S]` mean return of each seed by that way; NaN for a diverged seed, which is left out.
+        median: `[S]` the same by the median, from the same starts.
+
+    Example:
+        >>> estimate = gain(np.array([90.0, 99.0]), np.array([100.0, 100.0]))
+        >>> round(float(estimate.value), 1)
+        -5.5
+    """
+    unit = np.nanmean(np.abs(median)) / 100
+    generator = np.random.default_rng(0)
+    options: dict[str, Any] = {"statistic": "mean", "paired": True, "missing": "exclude"}
+    return difference(returns / unit, median / unit, generator, resamples=RESAMPLES, **options)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """In how many cells a way to act is found below the median, or above it.
+
+    Made by `count`, which has an example.
+    """
+
+    below: int
+    above: int
+    cells: int
+    """All that were compared."""
+    robots_below: tuple[str, ...]
+    robots_above: tuple[str, ...]
+    least: float
+    """The smallest loss among those below, in % of the median's return; NaN where there is none."""
+    most: float
+    """The largest."""
+
+
+def count(rows: Sequence[Row], way: str) -> Counts:
+    """Count the rows whose 95 % interval lies wholly on one side of zero.
+
+    Args:
+        rows: as `rows_of` returns them.
+        way: a key of their gains.
+
+    Example:
+        >>> gains = {"mode": Estimate(-3.0, -5.0, -1.0, 10, 0, 0.95, "difference of means")}
+        >>> count([Row("Ant", "PPO, Beta", "beta", gains)], "mode")  # doctest: +NORMALIZE_WHITESPACE
+        Counts(below=1, above=0, cells=1, robots_below=('Ant',), robots_above=(), least=3.0, most=3.0)
+    """
+    below, above = ([row for row in rows if row.found(way) == sign] for sign in (-1, 1))
+    losses = [-float(row.gains[way].value) for row in below] or [float("nan")]
+    robots = [tuple(dict.fromkeys(row.robot for row in found)) for found in (below, above)]
+    return Counts(len(below), len(above), len(rows), robots[0], robots[1], min(losses), max(losses))
+
+
+def draw(rows: Sequence[Row], ways: Mapping[str, str] = WAYS) -> Figure:
     """Draw a row for each cell under the name of its robot, and a panel for each way to act.
 
     Args:
         rows: as `rows_of` returns them.
+        ways: to act, keys of the rows' gains, and the panels' titles.
 
     Example:
         >>> gain = Estimate(-3.0, -5.0, -1.0, 10, 0, 0.95, "difference of means")
@@ -119,8 +167,8 @@ def draw(rows: Sequence[Row]) -> Figure:
     for robot in dict.fromkeys(row.robot for row in rows):
         lines += [robot, *(row for row in rows if row.robot == robot)]
     size = (WIDTH, 1.1 + _ROW_HEIGHT * len(lines))
-    fig, axes = plt.subplots(1, len(WAYS), sharex=True, sharey=True, figsize=size, squeeze=False)
-    for ax, (way, title) in zip(axes.flat, WAYS.items(), strict=True):
+    fig, axes = plt.subplots(1, len(ways), sharex=True, sharey=True, figsize=size, squeeze=False)
+    for ax, (way, title) in zip(axes.flat, ways.items(), strict=True):
         for place, row in enumerate(lines):
             if isinstance(row, Row):
                 gain, look = row.gains[way], LOOKS[row.family]
