@@ -25,7 +25,6 @@ from inbounds.study.running.play_ways import evaluate_cells
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
 from inbounds.study.running.verify import Checked, verify
 from inbounds.study.store import StudyFolder
-from inbounds.study.ways_played import evaluated
 
 Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...]")]
 
@@ -222,7 +221,7 @@ def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Console) -> int
     played = evaluate_cells(
         cells, command.folder(), lambda line: console.print(line, markup=False, soft_wrap=True)
     )
-    if publish_records(evaluated(command.folder(), cells), command.folder()):
+    if publish_records([cell for cell in cells if cell.keeps_policies], command.folder()):
         console.print("records: played", markup=False)
     console.print(f"{len(played)} cells played now", markup=False)
     return 0

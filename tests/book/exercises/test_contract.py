@@ -16,6 +16,7 @@ from inbounds.book import exercises
 from inbounds.book.exercises.judging import Judgement
 from tests.book.exercises import (
     test_actions_have_bounds,
+    test_bang_bang,
     test_beta_policies,
     test_beta_spread_and_region,
     test_clipped_divergence,
@@ -27,8 +28,8 @@ from tests.book.exercises import (
     test_logit_normal_moments,
     test_policy_that_learns,
     test_six_untrained_robots,
-    test_tanh_gaussian,
     test_storing_actions,
+    test_tanh_gaussian,
     test_three_centres,
     test_trpo,
     test_update_without_autograd,
@@ -45,6 +46,7 @@ RIGHT = [
     pytest.param(getattr(importlib.import_module(f"{exercises.__name__}.{chapter}"), name), right, id=name)
     for chapter, answers in {
         "actions_have_bounds": test_actions_have_bounds.RIGHT,
+        "bang_bang": test_bang_bang.RIGHT,
         "beta_policies": test_beta_policies.RIGHT,
         "beta_spread_and_region": test_beta_spread_and_region.RIGHT,
         "clipped_divergence": test_clipped_divergence.RIGHT,

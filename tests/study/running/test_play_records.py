@@ -10,7 +10,7 @@ import torch
 from inbounds.study import run_cell
 from inbounds.study.running.play_records import RECORDS, publish_records, read_records, records_of
 from tests.study.running.test_play_ways import cell_of, short_episodes  # noqa: F401 (a fixture that applies itself)
-from tests.study.small import folder_in
+from tests.study.small import folder_in, small_cell
 
 BITS = {"action, float64": 53, "action, float32": 24, "action, float16": 11, "action, bfloat16": 8}
 
@@ -40,6 +40,10 @@ def test_the_files_rows_are_the_policies(tmp_path: Path) -> None:
     run_cell(cell, folder)
     assert publish_records([cell, cell_of("gaussian")], folder)
     assert not publish_records([cell], folder)
+    other = small_cell(family="logit-normal", epochs=1, keeps_policies=True, algorithm="trpo")
+    run_cell(other, folder)
+    assert publish_records([other], folder)  # what was there stays
+    assert read_records(folder).keys() == {cell.id, other.id}
     kinds = read_records(folder)[cell.id]
     assert kinds.keys() == RECORDS.keys()
     assert (kinds["latent, float32"]["worst"] == 0).all()  # a policy in float32 draws latents in float32

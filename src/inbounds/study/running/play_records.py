@@ -162,19 +162,24 @@ def records_of(cell: Cell, folder: StudyFolder) -> list[dict[str, Any]]:
 
 
 def publish_records(cells: Sequence[Cell], folder: StudyFolder) -> bool:
-    """Write the records of every logit-normal cell among some, unless all of them are there.
+    """Add the records of every logit-normal cell among some that ships its policies and is not there yet.
 
     Returns:
         Whether anything had to be done.
     """
-    mine = [cell for cell in cells if cell.family == "logit-normal"]
+    mine = [c for c in cells if c.family == "logit-normal" and folder.policy_files(c)[0].is_file()]
     path = records_file(folder)
-    if not mine or (path.is_file() and {cell.id for cell in mine} <= read_records(folder).keys()):
+    kept, policies = [], {}
+    if path.is_file():
+        kept, policies = store.read_cell(path).to_pylist(), store.read_metadata(path)["policies"]
+    new = [cell for cell in mine if cell.id not in policies]
+    if not new:
         return False
-    table = pa.Table.from_pylist([row for cell in mine for row in records_of(cell, folder)], SCHEMA)
-    policies = {cell.id: store.sha256(folder.policy_files(cell)[0]) for cell in mine}
+    rows = kept + [row for cell in new for row in records_of(cell, folder)]
+    policies |= {cell.id: store.sha256(folder.policy_files(cell)[0]) for cell in new}
     about = {"study_version": STUDY_VERSION, "id": "records", "config": {}, "policies": policies}
-    folder.publish({path: parquet_bytes(table, json.dumps(about | {"session": provenance()}))})
+    metadata = json.dumps(about | {"session": provenance()})
+    folder.publish({path: parquet_bytes(pa.Table.from_pylist(rows, SCHEMA), metadata)})
     return True
 
 
