@@ -17,15 +17,15 @@ def snap(function: Callable[..., Any]) -> Judgement:
         a, lower, upper = (np.array(x, np.float64) for x in (action, low, high))
         nearer = np.where(np.abs(a - lower) < np.abs(upper - a), lower, upper)
         mistakes = {
+            "a component in the middle goes to the upper bound": np.where(
+                np.abs(a - lower) <= np.abs(upper - a), lower, upper
+            ),
             "the sign decides for symmetric boxes only: compare with the middle of the box": np.where(
                 a < 0, lower, upper
             ),
             "that is the farther bound": np.where(nearer == lower, upper, lower),
             "those are signs: the bounds are low and high": np.sign(nearer - (lower + upper) / 2),
             "that is the clip, which leaves the inside as it is": np.clip(a, lower, upper),
-            "a component in the middle goes to the upper bound": np.where(
-                np.abs(a - lower) <= np.abs(upper - a), lower, upper
-            ),
         }
         return Case((a, lower, upper), nearer, mistakes)
 
