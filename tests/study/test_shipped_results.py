@@ -14,8 +14,8 @@ from inbounds.study.cell import STUDY_VERSION
 from inbounds.study.running.check_ways import check_replay, wrong_evaluation
 from inbounds.study.running.play_records import RECORDS, read_records
 from inbounds.study.running.verify import NOTHING_TO_RERUN, check_cells, check_column, check_sums, columns
-from inbounds.study.store import COLUMNS, read_cell
-from inbounds.study.ways_played import EPISODES, evaluated, read_nothing, read_ways
+from inbounds.study.store import COLUMNS, read_cell, read_metadata
+from inbounds.study.ways_played import EPISODES, evaluated, evaluation_file, read_nothing, read_ways
 
 ROOT = Path(__file__).parents[2]
 RESULTS = StudyFolder(ROOT / "results", ROOT / "runs" / "study")
@@ -97,10 +97,14 @@ def test_every_shipped_policy_has_been_played_or_is_new() -> None:
 
 
 def test_the_evaluations_repeat_the_returns_of_the_final_policies() -> None:
-    """Two programs, written at different times, from the same starts: on robots with ten episodes, bit for bit."""
+    """Played at other times, from the same starts: bit for bit on the cell's processor, with ten episodes a seed."""
     compared = 0
     for cell in evaluated(RESULTS, CELLS):
-        if EPISODES[cell.robot] < 10:
+        here = read_metadata(evaluation_file(RESULTS, cell))["session"]["processor"]
+        if (
+            EPISODES[cell.robot] < 10
+            or read_metadata(RESULTS.cell_file(cell))["sessions"][-1]["processor"] != here
+        ):
             continue
         rows = read_cell(RESULTS.policy_files(cell)[1]).to_pylist()
         for way, played in read_ways(RESULTS, cell).items():

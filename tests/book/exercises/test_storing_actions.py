@@ -13,7 +13,7 @@ def by_rounding(z):
     """Add bits until the stored action is not the bound."""
     mpmath.mp.dps = 50
     distance = 2 / (1 + mpmath.exp(mpmath.mpf(z)))
-    return next(bits for bits in range(1, 100) if mpmath.nint(distance * 2**bits) > 0)
+    return float(next(bits for bits in range(1, 100) if mpmath.nint(distance * 2**bits) > 0))
 
 
 RIGHT = {"bits_for": by_rounding}
