@@ -47,8 +47,9 @@ class Record(NamedTuple):
         """Return what it gives back of latents in float64.
 
         Example:
-            >>> Record(torch.float32, 1 - 2.0**-24).recalled(torch.tensor([2.0, 30.0]).double()).tolist()[1]
-            17.328679513998637
+            >>> record = Record(torch.float32, 1 - 2.0**-24)
+            >>> round(record.recalled(torch.tensor([30.0]).double()).item(), 6)  # not 30: the action is the bound
+            17.328679
         """
         return 2 * torch.atanh(self._stored(latent).clamp(-self.edge, self.edge))
 
@@ -193,7 +194,7 @@ def read_records(folder: StudyFolder) -> dict[str, dict[str, dict[str, Floats]]]
 
     Example:
         >>> records = read_records(StudyFolder())  # in the project's folder
-        >>> records["standard-ant-ppo-logit-normal"]["latent, float32"]["wrong"].max()
+        >>> records["standard-ant-ppo-logit-normal"]["latent, float32"]["wrong"].max().item()
         0.0
     """
     table = store.read_cell(records_file(folder))
