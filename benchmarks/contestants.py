@@ -197,8 +197,14 @@ def rltools(work: Work) -> Turn:
     for network in ("ACTOR", "CRITIC"):
         shape |= {f"{network}_HIDDEN_DIM": hidden, f"{network}_NUM_LAYERS": depth}
         shape[f"{network}_ACTIVATION_FUNCTION"] = "TANH"
+
+    def make() -> Any:  # it asks for actions in [−1, 1], which those of Humanoid are not
+        env: Any = gymnasium.make(work.env)
+        as_asked = (env.action_space.low == -1).all() and (env.action_space.high == 1).all()
+        return env if as_asked else gymnasium.wrappers.RescaleAction(env, -1.0, 1.0)
+
     loop = PPO(
-        lambda: gymnasium.make(work.env),
+        make,
         interface_name=f"{work.env.replace('-', '_').lower()}_{work.horizon}",
         enable_evaluation=False,
         STEP_LIMIT=10**6,
