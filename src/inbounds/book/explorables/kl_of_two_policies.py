@@ -6,7 +6,7 @@
 
     kl_of_two_policies()
 
-The mathematics runs in the reader's browser (``explorables/kl_of_two_policies.js``) and is tested against this
+The mathematics runs in the reader's browser (`explorables/kl_of_two_policies.js`) and is tested against this
 package.
 """
 
@@ -20,29 +20,43 @@ import numpy as np
 import torch
 from bokeh.models import ColumnDataSource, Span
 from matplotlib.figure import Figure
-from torch.distributions import Distribution, Normal, kl_divergence
+from torch.distributions import Distribution, kl_divergence
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
-from inbounds.distributions import ClippedNormal, LogitNormal
+from inbounds.distributions import ClippedNormal
+from inbounds.learning.families import FAMILIES, NormalParameters
 
 __all__ = ["MAPS", "TwoPolicies", "kl_of_two_policies"]
 
 Pair: TypeAlias = tuple[float, float]
 
+
+@dataclass(frozen=True)
+class Map:
+    """What a policy family's map does to the latent, and what its picture therefore needs."""
+
+    does: str
+    """In words."""
+    bounded: bool = True
+    """Whether the action lies in [-1, 1]."""
+    atoms: bool = False
+    """Whether the bounds carry mass."""
+
+
 MAPS = {
-    "gaussian": "as drawn",
-    "logit-normal": "squashed",
-    "clipped-gaussian": "clipped",
+    "gaussian": Map("as drawn", bounded=False),
+    "logit-normal": Map("squashed"),
+    "clipped-gaussian": Map("clipped", atoms=True),
 }
-"""Policy family → what its map does to the latent, in the order of the pictures."""
+"""By policy family, in the order of the pictures. The laws themselves come from the families' own files."""
 
 _LOC, _LOG_SCALE = (-3.0, 3.0), (-2.0, 1.0)
 
 
 @dataclass(frozen=True)
 class TwoPolicies:
-    """An old policy N(μ, σ²) and a new one, as laws of the latent, under the maps of :data:`MAPS`.
+    """An old policy N(μ, σ²) and a new one, as laws of the latent, under the maps of `MAPS`.
 
     As drawn, the action is the latent z itself; squashed it is tanh(z/2), a logit-normal on [-1, 1]; clipped it is
     min(max(z, -1), 1).
@@ -56,11 +70,11 @@ class TwoPolicies:
     """μ and σ of the new policy's latent."""
 
     def laws(self, family: str) -> tuple[Distribution, Distribution]:
-        """The laws of the action under a family's map, old and new, float64."""
+        """Return the laws of the action under a family's map, old and new, float64."""
         return _law(family, *self.old), _law(family, *self.new)
 
     def kl(self, family: str) -> Pair:
-        """KL(old‖new) and KL(new‖old) of the action, in nats, exact.
+        """Return KL(old‖new) and KL(new‖old) of the action, in nats, exact.
 
         Example:
             >>> policies = TwoPolicies(old=(0.0, 1.0), new=(1.0, 1.0))
@@ -73,10 +87,8 @@ class TwoPolicies:
 
 def _law(family: str, mu: float, sigma: float) -> Distribution:
     loc, scale = torch.tensor([mu, sigma], dtype=torch.float64)
-    if family == "gaussian":
-        return Normal(loc, scale)
-    kind = LogitNormal if family == "logit-normal" else ClippedNormal
-    return kind(loc, scale, low=-1.0, high=1.0)
+    low, high = torch.tensor([-1.0, 1.0], dtype=torch.float64)
+    return FAMILIES[family].distribution(NormalParameters(loc, scale.log()), low, high)
 
 
 def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explorable:
@@ -104,15 +116,17 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
                 "choose mu in [-3, 3], sigma in [0.14, 2.71]"
             )
     policies = TwoPolicies(old, new)
-    kl = {family: policies.kl(family)[0] for family in MAPS}
+    divergences = [
+        f"{policies.kl(family)[0]:.3f}{'' if shown.bounded else ' nats'} {shown.does}"
+        for family, shown in MAPS.items()
+    ]
     return Explorable(
         name="kl-of-two-policies",
         title="two policies under three maps, over the location and scale of each",
         alt=(
             "An old and a new policy, as drawn, squashed into the interval from -1 to 1, and clipped to it. At the old "
             f"μ = {old[0]:g}, σ = {old[1]:g} and the new μ = {new[0]:g}, σ = {new[1]:g} the divergence old to new is "
-            f"{kl['gaussian']:.3f} nats as drawn, {kl['logit-normal']:.3f} squashed and {kl['clipped-gaussian']:.3f} "
-            "clipped."
+            f"{', '.join(divergences[:-1])} and {divergences[-1]}."
         ),
         controls=tuple(
             control
@@ -125,7 +139,7 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
             )
         ),
         plots=tuple(_picture(family) for family in MAPS),
-        columns=MAPS,
+        columns={family: shown.does for family, shown in MAPS.items()},
         rows={
             "kl": "KL(old‖new)",
             "reverse": "KL(new‖old)",
@@ -140,37 +154,35 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
 
 
 def _picture(family: str) -> Any:
-    """One empty picture; old curves are wide and pale, new ones narrow."""
-    latent = family == "gaussian"
+    """Return one empty picture; old curves are wide and pale, new ones narrow."""
+    shown = MAPS[family]
     fig = plot(
-        "latent z" if latent else f"action, {MAPS[family]}",
-        "density",
-        (-9.0, 9.0) if latent else (-1.35, 1.35),
+        f"action, {shown.does}" if shown.bounded else "latent z",
+        "density, mass" if shown.atoms else "density",
+        (-1.35, 1.35) if shown.bounded else (-9.0, 9.0),
         f"y-{family}",
         height=210,
     )
     for role, width, alpha in (("old", 6, 0.4), ("new", 2.5, 1.0)):
         curve(fig, family, figures.LOOKS[family], source=f"{family}-{role}")
         fig.renderers[-1].glyph.update(line_width=width, line_alpha=alpha)
-        if family == "clipped-gaussian":
+        if shown.atoms:
             atoms = ColumnDataSource({"x": [], "mass": []}, name=f"atoms-{role}")
             fig.vbar(
                 "x", top="mass", width=0.1, source=atoms, name=family, fill_alpha=0.55 * alpha, line_alpha=alpha,
                 line_width=2,
             )  # fmt: skip
-    if not latent:
+    if shown.bounded:
         fig.renderers.extend(Span(location=bound, dimension="height", line_width=1) for bound in (-1.0, 1.0))
-    if family == "clipped-gaussian":
-        fig.yaxis.axis_label = "density, mass"
     return fig
 
 
 def _static_figure(policies: TwoPolicies) -> Figure:
-    """The static figure of :func:`kl_of_two_policies`."""
+    """Return the static figure of `kl_of_two_policies`."""
     with figures.use_style():
         fig, axes = plt.subplots(1, 3, figsize=(figures.WIDTH, 3.2))
-        for ax, (family, verb) in zip(axes, MAPS.items(), strict=True):
-            end = 9.0 if family == "gaussian" else 0.9999
+        for ax, (family, shown) in zip(axes, MAPS.items(), strict=True):
+            end = 0.9999 if shown.bounded else 9.0
             grid = torch.linspace(-end, end, 2001, dtype=torch.float64)
             style = figures.family_style(family) | {"label": None}
             laws = policies.laws(family)
@@ -180,6 +192,8 @@ def _static_figure(policies: TwoPolicies) -> Figure:
                     place = 1.1 if width > 3 else 1.22
                     masses = [float(law.mass_low), float(law.mass_high)]
                     ax.bar([-place, place], masses, width=0.1, color=style["color"], alpha=0.6 * alpha)
-            ax.set(title=f"{verb}: {policies.kl(family)[0]:.3f} nats", xlabel="action", ylim=(0.0, None))
+            ax.set(
+                title=f"{shown.does}: {policies.kl(family)[0]:.3f} nats", xlabel="action", ylim=(0.0, None)
+            )
         axes[0].set(xlabel="latent z", ylabel="density", xlim=(-5, 5))
     return fig
