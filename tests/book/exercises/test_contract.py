@@ -33,6 +33,7 @@ from tests.book.exercises import (
     test_three_centres,
     test_trpo,
     test_update_without_autograd,
+    test_when_does_the_law_matter,
 )
 
 NOTEBOOKS = Path(__file__).resolve().parents[3] / "notebooks"
@@ -63,6 +64,7 @@ RIGHT = [
         "storing_actions": test_storing_actions.RIGHT,
         "three_centres": test_three_centres.RIGHT,
         "trpo": {"linear_fisher_product": test_trpo.fisher_blocks},
+        "when_does_the_law_matter": test_when_does_the_law_matter.RIGHT,
     }.items()
     for name, right in answers.items()
 ]
