@@ -64,7 +64,7 @@ def test_the_engine_repeats_two_epochs(
     finished = any(
         RESULTS.state(cell) == "finished"
         for cell in CELLS
-        if (cell.algorithm, cell.family) == (algorithm, family)
+        if (cell.algorithm, cell.family, cell.engine) == (algorithm, family, engine)
     )
     assert (finding.message == NOTHING_TO_RERUN) is not finished
 
