@@ -60,7 +60,7 @@ def inbounds_config(work: Work, algo: str, seeds: int, family: str) -> Any:
 def inbounds(
     algo: str, seeds: int, family: str = "gaussian", engine: str = "autograd"
 ) -> Callable[[Work], Turn]:
-    """This package, by either engine."""
+    """Return what starts this package, by either engine."""
 
     def start(work: Work) -> Turn:
         from inbounds.learning import Trainer
@@ -81,7 +81,7 @@ def inbounds(
 
 
 def stable_baselines(module: str, algo: str, normalize: bool = True) -> Callable[[Work], Turn]:
-    """An on-policy algorithm with stable-baselines3's interface: `learn`, one rollout and one update at a time."""
+    """Return what starts an on-policy algorithm with stable-baselines3's `learn`, one rollout and update at a time."""
 
     def start(work: Work) -> Turn:
         from stable_baselines3.common.env_util import make_vec_env
@@ -122,7 +122,7 @@ def stable_baselines(module: str, algo: str, normalize: bool = True) -> Callable
 
 
 def cleanrl(work: Work) -> Turn:
-    """CleanRL's `ppo_continuous_action.py` (version 1.2.0), as it is in its wheel, in a thread that waits its turn.
+    """Start CleanRL's `ppo_continuous_action.py` (version 1.2.0) as its wheel has it, in a thread that waits its turn.
 
     The script has no function to call: it runs to its end. Its last line of each iteration logs `charts/SPS`, and its
     SummaryWriter, of which ours is a stub, is where it waits. It was written for Gymnasium 0.29, in which

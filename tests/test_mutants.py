@@ -53,6 +53,7 @@ SOUND = Mutant(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mutant", "status"),
     [

@@ -48,10 +48,12 @@ def left_by(folder: Path, last_line: str, *options: str) -> set[str]:
     return {path.name for path in temporary.rglob("*") if path.is_file() or path.name.startswith("tmp")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["one process", "a worker"])
 def test_nothing_is_left(tmp_path: Path, options: tuple[str, ...]) -> None:
     assert left_by(tmp_path, "pass", *options) == set()
 
 
+@pytest.mark.slow
 def test_of_a_failure_pytests_own_folder_is_left(tmp_path: Path) -> None:
     assert left_by(tmp_path, "assert False") == {"kept"}

@@ -3,7 +3,7 @@
     python tools/assemble_program.py FOLDER            every chapter that has one
     python tools/assemble_program.py FOLDER NAME ...   some chapters
 
-The book's extension does the same when the book is built: the files lie in ``_static/programs``.
+The book's extension does the same when the book is built: the files lie in `_static/programs`.
 """
 
 import argparse

@@ -41,7 +41,7 @@ PAGES = ("book", "notebooks", "tools/build_book.py", "tools/student_copies.py", 
 
 
 def digest(*names: str) -> str:
-    """A digest of the contents of files and folders (below ROOT), ignoring what Python and Jupyter leave behind."""
+    """Return a digest of the contents of files and folders below ROOT, without what Python and Jupyter leave behind."""
     total = hashlib.sha256(sys.version.encode())
     for name in names:
         base = ROOT / name
@@ -106,7 +106,7 @@ def build(code: str) -> int:
 
 
 def zip_book() -> Path:
-    """One file to read offline: unpack it anywhere and open index.html."""
+    """Write one file to read offline: unpack it anywhere and open index.html."""
     sys.path.insert(0, str(ROOT / "src"))
     from inbounds import __version__
 

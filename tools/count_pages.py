@@ -3,8 +3,8 @@
     python tools/count_pages.py                 every page; fails if a rewritten chapter asks for too much
     python tools/count_pages.py NAME ...        some pages
 
-The budgets and the list of rewritten chapters stand in ``book/budgets.toml``; what counts, and what does not, in
-``src/inbounds/book/pages/counts.py``.
+The budgets and the list of rewritten chapters stand in `book/budgets.toml`; what counts, and what does not, in
+`src/inbounds/book/pages/counts.py`.
 """
 
 import argparse
@@ -62,8 +62,8 @@ def complaints(root: Path, budgets: Mapping[str, Any]) -> Iterator[str]:
     """Say what keeps the rewritten chapters from their budgets.
 
     Args:
-        root: of the book, with ``_toc.yml`` and ``notebooks``.
-        budgets: as ``book/budgets.toml`` has them.
+        root: of the book, with `_toc.yml` and `notebooks`.
+        budgets: as `book/budgets.toml` has them.
     """
     rewritten, core = budgets["rewritten"], contents(root / "_toc.yml").core
     counted = {}

@@ -37,7 +37,7 @@ def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 
 def complaints(notebook: nbformat.NotebookNode) -> list[str]:
-    """What keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
+    """Return what keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
     found, expected = unknown_values(notebook), 1
     for number, cell in enumerate(notebook.cells):
         if cell.cell_type != "code" or not cell.source.strip():
@@ -58,13 +58,13 @@ def complaints(notebook: nbformat.NotebookNode) -> list[str]:
 
 
 def lines_beside_imports(source: str) -> int:
-    """How many lines a cell has that import nothing."""
+    """Return how many lines a cell has that import nothing."""
     imports = [node for node in ast.parse(source).body if isinstance(node, ast.Import | ast.ImportFrom)]
     return len(source.splitlines()) - sum((node.end_lineno or 0) - node.lineno + 1 for node in imports)
 
 
 def glued(notebook: nbformat.NotebookNode) -> dict[str, str]:
-    """All values that a notebook glues, as it stores them, by name."""
+    """Return all values that a notebook glues, as it stores them, by name."""
     return {
         output.metadata["scrapbook"]["name"]: "".join(
             output.data.get(LIGHT[0], output.data.get(LIGHT[1], ""))
@@ -76,7 +76,7 @@ def glued(notebook: nbformat.NotebookNode) -> dict[str, str]:
 
 
 def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
-    """What the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
+    """Return what the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
     known, found = {"": glued(notebook)}, []
     for number, cell in enumerate(notebook.cells):
         for other, name, how in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
@@ -92,7 +92,7 @@ def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
 
 
 def is_number(text: str) -> bool:
-    """Whether a stored value can be formatted: the build reads it as text, and ``np.float64(1.5)`` is none."""
+    """Return whether a stored value can be formatted: the build reads it as text, and `np.float64(1.5)` is none."""
     try:
         float(text)
     except ValueError:

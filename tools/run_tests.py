@@ -53,7 +53,7 @@ def run(arguments: list[str], expected: set[str]) -> int:
 
 
 def kind(case: ElementTree.Element) -> str:
-    """Whether a test case is a cell of a notebook."""
+    """Return whether a test case is a cell of a notebook."""
     return "notebooks" if case.get("classname", "").endswith(".ipynb") else "package and book"
 
 

@@ -3,8 +3,8 @@
     python tools/student_copies.py [FOLDER]    hand the chapters out into FOLDER (lab/), as `make lab` does
 
 An exercise is a stub, a solution and a grader's cell. In the book the solution comes after the stub and takes its
-place; here it is left out, prose and cells alike, from ``{solution-start}`` to ``{solution-end}``, and so is any other
-cell with the tag ``solution``. The book's download button hands out the same copies (``tools/build_book.py``).
+place; here it is left out, prose and cells alike, from `{solution-start}` to `{solution-end}`, and so is any other
+cell with the tag `solution`. The book's download button hands out the same copies (`tools/build_book.py`).
 
 A copy that a student has changed is never overwritten.
 """
@@ -28,7 +28,7 @@ INSTEAD = "*The solution is in the book.*"
 
 
 def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """The notebook without its solutions, and without outputs, which are the book's and not the student's.
+    """Return the notebook without its solutions, and without outputs, which are the book's and not the student's.
 
     Args:
         notebook: a chapter, unchanged by this.
@@ -79,7 +79,7 @@ def without_solutions(text: str, inside: bool) -> tuple[str, bool]:
 
 
 def written(path: Path) -> str:
-    """The student copy of a chapter, as the text of a notebook file."""
+    """Return the student copy of a chapter, as the text of a notebook file."""
     notebook = nbformat.read(path, as_version=4)
     try:
         return nbformat.writes(student_copy(notebook)) + "\n"
@@ -88,10 +88,10 @@ def written(path: Path) -> str:
 
 
 def chapters_in_order(toc: Path = ROOT / "_toc.yml") -> dict[str, Path]:
-    """The notebooks as a class reads them, and the book's notebook of each.
+    """Return the notebooks as a class reads them, and the book's notebook of each.
 
-    Core chapters are numbered, ``01_actions_have_bounds.ipynb`` and so on; the pages of *Going deeper* follow them as
-    ``deeper_NAME.ipynb``.
+    Core chapters are numbered, `01_actions_have_bounds.ipynb` and so on; the pages of *Going deeper* follow them as
+    `deeper_NAME.ipynb`.
 
     Args:
         toc: the book's table of contents, at its root. A file has no number of its own there: chapters move.
@@ -110,7 +110,7 @@ def hand_out(chapters: Mapping[str, Path], folder: Path) -> dict[str, str]:
         folder: the student's; made if it is not there.
 
     Returns:
-        By name: ``new``, ``unchanged``, ``updated``, ``kept`` (the student changed it), or ``outdated`` (the student
+        By name: `new`, `unchanged`, `updated`, `kept` (the student changed it), or `outdated` (the student
         changed it, and the book has a newer version).
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -134,7 +134,7 @@ def hand_out(chapters: Mapping[str, Path], folder: Path) -> dict[str, str]:
 
 
 def read_ledger(path: Path) -> dict[str, str]:
-    """What was handed out, by name; nothing where the ledger is lost or garbled.
+    """Return what was handed out, by name; nothing where the ledger is lost or garbled.
 
     A notebook that the ledger does not know counts as changed, so a lost ledger costs no student's work.
     """
@@ -157,14 +157,14 @@ def write_downloads(chapters: Path, html: Path) -> None:
 
     Args:
         chapters: folder of the book's notebooks.
-        html: the built book, where ``_sources/notebooks/`` holds what the buttons link to.
+        html: the built book, where `_sources/notebooks/` holds what the buttons link to.
     """
     for download in sorted((html / "_sources" / chapters.name).glob("*.ipynb")):
         download.write_text(written(chapters / download.name), encoding="utf8")
 
 
 def digest(text: str) -> str:
-    """A digest of a notebook's text."""
+    """Return a digest of a notebook's text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 

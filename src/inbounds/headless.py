@@ -1,9 +1,9 @@
 """Which OpenGL MuJoCo draws with, decided before MuJoCo is imported.
 
-MuJoCo reads the environment variable ``MUJOCO_GL`` once, when it is first imported. On a Linux machine without a
+MuJoCo reads the environment variable `MUJOCO_GL` once, when it is first imported. On a Linux machine without a
 display its own choice, GLFW, cannot draw; a later change of the variable does not help but ends the process
-when the first frame is drawn. So :func:`choose_backend` runs on ``import inbounds``, and :func:`require_backend`
-refuses to draw while refusing is still possible. Neither imports ``mujoco`` or ``gymnasium``, so that the
+when the first frame is drawn. So `choose_backend` runs on `import inbounds`, and `require_backend`
+refuses to draw while refusing is still possible. Neither imports `mujoco` or `gymnasium`, so that the
 package stays light.
 """
 
@@ -22,12 +22,12 @@ _SWITCHED_OFF = ("disable", "disabled", "off", "false", "0")
 
 
 class BackendError(ImportError):
-    """MuJoCo cannot be imported with the OpenGL that ``MUJOCO_GL`` names; the message names the fix."""
+    """MuJoCo cannot be imported with the OpenGL that `MUJOCO_GL` names; the message names the fix."""
 
 
 @contextlib.contextmanager
 def naming_the_backend() -> Iterator[None]:
-    """Raise a `BackendError` in the place of whatever ``import mujoco`` raises over its OpenGL in this block.
+    """Raise a `BackendError` in the place of whatever `import mujoco` raises over its OpenGL in this block.
 
     MuJoCo refuses an unknown name with a RuntimeError, and PyOpenGL, where a library is missing, trips over a None.
     """
@@ -46,14 +46,14 @@ def naming_the_backend() -> Iterator[None]:
 
 
 def choose_backend() -> str | None:
-    """Set ``MUJOCO_GL`` to a backend that can draw off screen, where MuJoCo would not find one itself.
+    """Set `MUJOCO_GL` to a backend that can draw off screen, where MuJoCo would not find one itself.
 
-    Nothing happens on macOS and Windows, with a display, when the variable is already set, or once ``mujoco`` is
-    imported (see :func:`require_backend`). On a headless Linux machine EGL is taken, or OSMesa where EGL's
+    Nothing happens on macOS and Windows, with a display, when the variable is already set, or once `mujoco` is
+    imported (see `require_backend`). On a headless Linux machine EGL is taken, or OSMesa where EGL's
     library cannot be loaded.
 
     Returns:
-        The backend that was set, ``"egl"`` or ``"osmesa"``; None where nothing was changed.
+        The backend that was set, `"egl"` or `"osmesa"`; None where nothing was changed.
     """
     if os.environ.get("MUJOCO_GL") or "mujoco" in sys.modules or not _is_headless():
         return None
@@ -87,7 +87,7 @@ def require_backend() -> None:
 
 
 def _is_headless() -> bool:
-    """Whether this is a Linux machine (or session) without a display."""
+    """Return whether this is a Linux machine (or session) without a display."""
     has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     return sys.platform.startswith("linux") and not has_display
 

@@ -29,6 +29,7 @@ def test_its_loss_and_its_update_pass_the_graders(program: dict[str, Any]) -> No
     assert graders.ppo_update(program["ppo_update"]).passed is True
 
 
+@pytest.mark.slow
 def test_it_learns_to_balance_a_pole(program: dict[str, Any]) -> None:
     """A task that terminates, as the chapter's robot never does."""
     before = torch.get_num_threads()

@@ -110,6 +110,7 @@ def last_output(notebook: nbformat.NotebookNode) -> str:
     return notebook.cells[-1].outputs[0].data["text/plain"]
 
 
+@pytest.mark.slow
 def test_run_all_grades_the_students_own_code() -> None:
     student = tool.student_copy(exercise())
     text = "\n".join(cell.source for cell in student.cells)

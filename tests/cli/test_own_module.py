@@ -72,6 +72,7 @@ def train(env: str, folder: Path, *more: str) -> subprocess.CompletedProcess[str
     return inbounds("train", f"my_arm:{env}", *SMALL, "--epochs", "2", "--out", "my run", *more, cwd=folder)
 
 
+@pytest.mark.slow
 def test_a_module_is_found_in_its_own_folder_and_its_run_is_watched_on_request_only(folder: Path) -> None:
     done = train("OwnHopper-v0", folder)
     assert (done.returncode, done.stderr) == (0, "")
@@ -97,6 +98,7 @@ def test_a_module_is_found_in_its_own_folder_and_its_run_is_watched_on_request_o
     assert lost.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
@@ -123,6 +125,7 @@ def test_nan_observations_are_no_matter_of_the_learning_rate(folder: Path) -> No
     assert "that is NaN, mend the environment" in again.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
 def test_training_that_nobody_reads_says_that_it_stops_and_keeps_everything(tmp_path: Path) -> None:
     words = [

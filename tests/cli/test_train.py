@@ -107,7 +107,13 @@ def test_when_all_seeds_diverge(tmp_path: Path) -> None:
 # ---- interruption
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGKILL,
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGINT, signal.SIGTERM)),
+    ],
+)
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(
     number: signal.Signals, tmp_path: Path
 ) -> None:

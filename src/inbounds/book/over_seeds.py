@@ -1,4 +1,4 @@
-"""Means over seeds with their intervals, as chapters 15 to 17 write them beside the tables of the protocol.
+"""Means over seeds with their intervals, as the chapters on the study write them beside the protocol's tables.
 
 The numbers that `results/PROTOCOL.md` lists have generators of their own (`inbounds.study.analysis`). What the chapters
 look at besides is exploratory, and each of its intervals is resampled from seed 0, so that it is the same tomorrow.

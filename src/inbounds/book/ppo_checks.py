@@ -85,7 +85,7 @@ class Scene:
         return dataclasses.replace(self, batch=SimpleNamespace(**vars(self.batch) | {"advantage": advantage}))
 
     def gradients(self, loss: Tensor) -> tuple[Tensor, Tensor]:
-        """The gradients for the policy and for the critic, a vector each; zero where the loss does not depend on it."""
+        """Return the gradients for policy and critic, a vector each; zero where the loss does not depend on it."""
 
         def gradient(network: nn.Sequential) -> Tensor:
             parameters = list(network.parameters())
@@ -97,7 +97,7 @@ class Scene:
         return gradient(self.actor), gradient(self.critic)
 
     def weighted_score(self, weights: Tensor) -> Tensor:
-        """−mean(weights ∇log π), what a loss's gradient for the policy should be."""
+        """Return −mean(weights ∇log π), what a loss's gradient for the policy should be."""
         log_prob = GAUSSIAN.log_prob(self.actor(self.batch.obs), self.batch.latent)
         return self.gradients(-(weights * log_prob).mean())[0]
 

@@ -222,7 +222,7 @@ def _corridor(cells: int, grip: float) -> tuple[Tensor, Tensor]:
 def ledge(
     cells: int = 6, gamma: float = 0.9, grip: float = 0.8, battery: float = 0.98, fall: float = 10.0
 ) -> SmallMDP:
-    """A rover on a ledge, paid for its speed, with a cliff behind the last cell.
+    """Return a rover on a ledge, paid for its speed, with a cliff behind the last cell.
 
     It starts in the first cell, which has a wall behind it. The reward is a − 0.1a², speed less control cost; in the
     last cell it is also charged for a fall, times the probability that it falls. A fall ends the episode.
@@ -248,7 +248,7 @@ def ledge(
 def slope(
     cells: int = 6, gamma: float = 0.9, grip: float = 0.8, battery: float = 0.98, climb: float = 0.4
 ) -> SmallMDP:
-    """A rover on a slope: climbing costs, and only the last cell, which has a wall behind it, lies in the sun.
+    """Return a rover on a slope: climbing costs, and only the last cell, which has a wall behind it, lies in the sun.
 
     It starts anywhere. The reward is −climb (1 + a)/2 − 0.1a², and one more in the sun.
 

@@ -33,7 +33,7 @@ def verdict(
         above: the words if the whole interval lies above.
         below: the words if the whole interval lies below.
         digits: decimals of the numbers in the answer; by default as returns are written.
-        unit: behind the numbers, with its space: ``" points"``.
+        unit: behind the numbers, with its space: `" points"`.
 
     Raises:
         ValueError: the ends are not in order, or not finite.

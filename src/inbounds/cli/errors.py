@@ -14,7 +14,7 @@ class CommandError(Exception):
 
 
 def is_ours(error: BaseException) -> bool:
-    """Whether this package raised an error, and not what it called: an environment's author needs the traceback.
+    """Return whether this package raised an error, and not what it called: an environment's author needs the traceback.
 
     Example:
         >>> from inbounds.cli.options import parse_seeds
@@ -29,7 +29,7 @@ def is_ours(error: BaseException) -> bool:
 
 
 def is_unread(error: BaseException) -> bool:
-    """Whether an error means that nobody reads the output any more (`| head`); Rich makes a SystemExit of it."""
+    """Return whether an error means that nobody reads the output any more (`| head`); Rich makes a SystemExit of it."""
     return isinstance(error, BrokenPipeError) or (
         isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError)
     )

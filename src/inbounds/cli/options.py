@@ -205,7 +205,7 @@ def parse(args: Sequence[str]) -> Command:
 
 
 def _train_defaults(args: Sequence[str]) -> Train:
-    """The values of the preset and the algorithm that the command line names."""
+    """Return the values of the preset and the algorithm that the command line names."""
     look = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     look.add_argument("--preset", default="common")
     look.add_argument("--algo", default="ppo")
@@ -222,5 +222,5 @@ def _values(config: Any) -> dict[str, Any]:
 
 
 def _as(kind: type[Any], config: Any) -> Any:
-    """The part of a configuration that a base class of its own class knows."""
+    """Return the part of a configuration that a base class of its own class knows."""
     return kind(**{f.name: getattr(config, f.name) for f in dataclasses.fields(kind)})

@@ -87,7 +87,7 @@ class TrainingProgress:
             self.unread = True  # in mid-epoch, perhaps: whoever asks stops at its end
 
     def _picture(self, text: str, done: int) -> Group:
-        """The numbers, and a bar below them that is as wide as the terminal."""
+        """Return the numbers, and a bar below them that is as wide as the terminal."""
         return Group(Text(text), ProgressBar(total=self.epochs, completed=done))
 
     def _remember_returns(self, trainer: Trainer) -> None:
@@ -98,7 +98,7 @@ class TrainingProgress:
             self._returns = new if self._returns is None else np.where(np.isnan(new), self._returns, new)
 
     def _describe(self, record: Record, done: int) -> str:
-        """One line about one epoch."""
+        """Return one line about one epoch."""
         healthy = ~record["diverged"]
         returns = self._returns[healthy & np.isfinite(self._returns)]
         spread = f" ± {returns.std(ddof=1):.1f}" if len(returns) > 1 else ""

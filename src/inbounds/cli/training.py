@@ -37,7 +37,7 @@ from inbounds.robots.registration import TASK_NAMES
 
 
 class Stop:
-    """The wish to stop: granted after the epoch the first time, at once the second."""
+    """Takes signals to stop: the first stops the run after the epoch under way, the second at once."""
 
     def __init__(self) -> None:
         self.signal: signal.Signals | None = None
@@ -50,7 +50,7 @@ class Stop:
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
-        """Take Ctrl-C, and what job schedulers send, for such a wish."""
+        """Take Ctrl-C, and what job schedulers send, as such signals."""
         before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
@@ -218,7 +218,7 @@ def _check_environment(config: TrainConfig) -> None:
 
 
 def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
-    """How many epochs the run directory holds; raises where going on from there would lose or mix something."""
+    """Return how many epochs the run directory holds; raise where going on would lose or mix something."""
     if not (run_dir / CHECKPOINT_FILE).exists():
         if any((run_dir / name).exists() for name in (CURVES_FILE, POLICIES_FILE)):
             raise CommandError(
@@ -239,7 +239,7 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
 
 
 def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
-    """What a `Trainer` would refuse to change in mid-run, as the command line spells it."""
+    """Return what a `Trainer` would refuse to change in mid-run, as the command line spells it."""
     different = changed_fields(config, stored, FREE_TO_CHANGE)
     if "algorithm_name" in different:  # another algorithm has other options, too
         different = {"algo": different["algorithm_name"]}

@@ -100,7 +100,7 @@ def _check(command: Watch, env: str, path: Path) -> None:
 
 
 def _choose(command: Watch) -> TrainedPolicy:
-    """The policy that the command means."""
+    """Return the policy that the command means."""
     try:
         policies = load_policies(command.run)
     except FileNotFoundError:

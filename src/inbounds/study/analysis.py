@@ -330,7 +330,7 @@ def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: Array
 def _scores_by_robot(
     outcomes: Outcomes, column: Column, endpoint: str, without_diverged: bool
 ) -> dict[str, Floats]:
-    """The robots on which a column is finished and at least two seeds count."""
+    """Return the robots on which a column is finished and at least two seeds count."""
     found = {}
     for robot in ROBOTS:
         if (outcome := outcomes.find(column, robot)) is not None:

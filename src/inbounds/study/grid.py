@@ -36,7 +36,7 @@ COMPARED = ("gaussian", "beta", "logit-normal")
 
 
 def _mechanisms() -> list[Cell]:
-    """The fourth arm, one thing changed at a time, still in any order."""
+    """Return the fourth arm, one thing changed at a time, still in any order."""
     printed = [name for name in VARIANTS if name.startswith("printed-")]
     entropy = [name for name in VARIANTS if name.startswith("entropy-")]
     plan: list[tuple[Sequence[str], Sequence[str], Sequence[str], Sequence[str]]] = [
@@ -64,7 +64,7 @@ def _columns(arm: str, columns: Iterable[tuple[str, str]], **values: Any) -> lis
 
 
 def _by_robot(cells: list[Cell]) -> tuple[Cell, ...]:
-    """All columns of one robot before the next; sorting is stable."""
+    """Return all columns of one robot before the next; sorting is stable."""
     return tuple(sorted(cells, key=lambda cell: ROBOTS.index(cell.robot)))
 
 
@@ -111,7 +111,7 @@ def _second(
     policies: int = 0,
     **values: Any,
 ) -> list[Cell]:
-    """The cells of columns of the second study; the policies of so many seeds are kept, on Humanoid of three."""
+    """Return the cells of columns of the second study; the policies of so many seeds are kept, on Humanoid of three."""
     common: dict[str, Any] = {"seeds": FIRST_SEEDS, "engine": "compiled", "version": SECOND_VERSION} | values
     return [
         Cell(
@@ -130,7 +130,7 @@ def _second(
 
 
 def _noise_and_steps() -> tuple[list[Cell], list[Cell]]:
-    """Blocks E and F: other noise, other step sizes."""
+    """Return blocks E and F: other noise, other step sizes."""
     noises = [f"noise-{std:g}" for std in NOISES]
     rates = [f"rate-{rate:g}" for rate in LEARNING_RATES]
     noise = _second("noise", "ppo", product(COMPARED, noises), ("HalfCheetah", "Hopper", "Ant"))

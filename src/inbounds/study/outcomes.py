@@ -163,7 +163,7 @@ class Outcome:
 
 
 def _by_way(episodes: pa.Table, column: str, seeds: int) -> dict[str, Floats]:
-    """Means `[S]` of a column by way to act; rows go way by way, seed by seed, episode by episode."""
+    """Return means `[S]` of a column by way to act; rows go way by way, seed by seed, episode by episode."""
     names = episodes["greedy"].to_pylist()
     values = episodes[column].to_numpy()
     return {
@@ -181,7 +181,7 @@ def _whole(path: Path, look: Callable[[Cell, pa.Table], str], cell: Cell) -> pa.
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What there is of a study.
+    """The finished cells of a study, and the state of every cell.
 
     Example:
         >>> from inbounds.study.store import StudyFolder

@@ -135,7 +135,7 @@ class StudyFolder:
         return self.work / cell.id
 
     def state(self, cell: Cell) -> State:
-        """Return what there is of a cell: its rows are compared with their checksum and the cell's configuration."""
+        """Return the state of a cell: its files must have their checksums, and its configuration must be the cell's."""
         path = self.cell_file(cell)
         if not path.is_file():
             return "missing"

@@ -94,6 +94,7 @@ def quiet(cells: list[Cell], folder: StudyFolder) -> tuple[StudyProgress, io.Str
     return StudyProgress(cells, folder, Console(file=said, width=200)), said
 
 
+@pytest.mark.slow
 def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path) -> None:
     cell, folder = small_cell(epochs=30), folder_in(tmp_path)
     process = start(tmp_path, 30, jobs=1)
@@ -217,6 +218,7 @@ def a_run(tmp_path: Path, body: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
     said = a_run(
         tmp_path,
@@ -235,6 +237,7 @@ def test_a_cell_that_warns_a_lot_ends(tmp_path: Path) -> None:
     assert said.count("and 980 more warnings") == 3
 
 
+@pytest.mark.slow
 def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> None:
     said = a_run(
         tmp_path,
@@ -260,6 +263,7 @@ def test_a_signal_between_two_starts_stops_what_is_started(tmp_path: Path) -> No
     assert f"{signal.SIGTERM.value} ['stopped']" in said
 
 
+@pytest.mark.slow
 def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
     said = a_run(
         tmp_path,

@@ -1,8 +1,8 @@
 """Figures on a page, each with the text that a reader hears who cannot see it.
 
-:func:`show` displays a figure and puts its alt text into the output's metadata, where nbconvert looks for it. MyST-NB,
-which builds the book, learns to look there from :class:`AltTextRenderer`; the package registers that under the entry
-point ``myst_nb.mime_renderers``.
+`show` displays a figure and puts its alt text into the output's metadata, where nbconvert looks for it. MyST-NB,
+which builds the book, learns to look there from `AltTextRenderer`; the package registers that under the entry
+point `myst_nb.mime_renderers`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ PIXELS_PER_INCH = 100
 
 
 def png_bytes(fig: Figure, *, pixel_ratio: float = 2.0) -> bytes:
-    """A figure as PNG, the same bytes for the same figure (no date, no version in the file)."""
+    """Return a figure as PNG, the same bytes for the same figure (no date, no version in the file)."""
     buffer = io.BytesIO()
     fig.savefig(buffer, format="png", dpi=PIXELS_PER_INCH * pixel_ratio, metadata={"Software": None})
     return buffer.getvalue()
 
 
 def svg_bytes(fig: Figure) -> bytes:
-    """A figure as SVG, its text as outlines, the same bytes for the same figure."""
+    """Return a figure as SVG, its text as outlines, the same bytes for the same figure."""
     import matplotlib as mpl
 
     buffer = io.BytesIO()
@@ -86,7 +86,7 @@ def show(fig: Figure, alt: str) -> None:
 
 
 class AltTextRenderer:
-    """MyST-NB plugin: an image output's ``alt`` metadata becomes the ``alt`` of the page's ``<img>``.
+    """MyST-NB plugin: an image output's `alt` metadata becomes the `alt` of the page's `<img>`.
 
     MyST-NB 1.4 takes width and height from an output's metadata, but not the alt text (``NbElementRenderer.
     render_image``). It asks plugins first, so this one lets it render the image and adds what is missing.

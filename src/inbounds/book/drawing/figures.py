@@ -5,7 +5,7 @@ lightness as well as in hue, so that they stay apart in greyscale print and unde
 blindness (a test simulates both); the line style says the same thing once more.
 
 Figures are opaque and white, which reads in the light and in the dark theme, in print, and on GitHub.
-:func:`~inbounds.book.drawing.alt_text.show` puts a figure on the page together with its alt text::
+`inbounds.book.drawing.alt_text.show` puts a figure on the page together with its alt text::
 
     figures.use_style()
     fig, ax = plt.subplots()
@@ -142,7 +142,7 @@ STYLE: Mapping[str, Any] = MappingProxyType(
 
 
 class _Restore(AbstractContextManager[None]):
-    """Gives Matplotlib its earlier parameters back at the end of a ``with`` block."""
+    """Gives Matplotlib its earlier parameters back at the end of a `with` block."""
 
     def __init__(self, before: Mapping[str, Any]) -> None:
         self._before = before
@@ -152,7 +152,7 @@ class _Restore(AbstractContextManager[None]):
 
 
 def use_style() -> AbstractContextManager[None]:
-    """Switch Matplotlib to the book's style: for good, or for the length of a ``with`` block.
+    """Switch Matplotlib to the book's style: for good, or for the length of a `with` block.
 
     Returns:
         A context manager that restores the parameters found; ignore it to keep the style.
@@ -168,14 +168,14 @@ def use_style() -> AbstractContextManager[None]:
 
 
 def family_style(family: str, *, markers: int | None = None) -> dict[str, Any]:
-    """Keyword arguments for ``Axes.plot`` that draw a policy family in its own look.
+    """Keyword arguments for `Axes.plot` that draw a policy family in its own look.
 
     Args:
-        family: A key of :data:`LOOKS`.
+        family: A key of `LOOKS`.
         markers: Draw the family's marker at every so many points; None draws a bare line.
 
     Returns:
-        ``color``, ``linestyle`` and ``label``, and with markers ``marker`` and ``markevery``.
+        `color`, `linestyle` and `label`, and with markers `marker` and `markevery`.
 
     Raises:
         ValueError: If there is no such family.
@@ -198,7 +198,7 @@ def density_panels(
     low: float = 0.0,
     high: float = 1.0,
 ) -> Figure:
-    """Panels side by side, each with the densities of a few distributions on one interval.
+    """Draw panels side by side, each with the densities of a few distributions on one interval.
 
     Args:
         panels: Per panel a title and its curves; a curve is a label and a distribution without batch axes.
@@ -206,7 +206,7 @@ def density_panels(
         high: Upper end of the interval.
 
     Returns:
-        The figure; densities above :data:`MAX_DENSITY` leave it at the top.
+        The figure; densities above `MAX_DENSITY` leave it at the top.
 
     Example:
         >>> from inbounds.distributions import LogitNormal
@@ -274,7 +274,7 @@ def beta_densities(
 def saturation_histogram(
     actions: Mapping[str, ArrayLike], low: float = -1.0, high: float = 1.0, bins: int = 40
 ) -> Figure:
-    """Where executed actions fall: a histogram inside the bounds, and the two bounds counted apart.
+    """Draw where executed actions fall: a histogram inside the bounds, and the two bounds counted apart.
 
     Args:
         actions: Per policy family the executed (already clipped) actions, of any shape.
@@ -315,7 +315,7 @@ def saturation_histogram(
 
 
 def _saturation_panel(ax: Any, family: str, action: np.ndarray, low: float, high: float, bins: int) -> None:
-    """One family's panel of :func:`saturation_histogram`."""
+    """Draw one family's panel of `saturation_histogram`."""
     style = family_style(family)
     if not action.size or not np.isfinite(action).all() or action.min() < low or action.max() > high:
         raise ValueError(

@@ -2,7 +2,7 @@
 
 A video is an MP4 (H.264, 4:2:0, the one format that every browser plays), carried in the page itself, so that the
 built book needs no other file. It starts when the reader asks, ends after at most five seconds and weighs at
-most 120 kB. The encoder is the ffmpeg that the package ``imageio-ffmpeg`` brings along.
+most 120 kB. The encoder is the ffmpeg that the package `imageio-ffmpeg` brings along.
 
 The browser's own controls stand in a band below the picture, not on it: they need no script, and a keyboard reaches
 them. Films that are shown together open with the moment in which they differ most.
@@ -114,7 +114,7 @@ def show_films(films: Mapping[str, Film]) -> VideoRow:
         <2 videos: 'Gaussian', 'Beta'>
     """
     if not films:
-        raise ValueError("There is no film to show: pass a mapping from captions to films.")
+        raise ValueError("there is no film to show: pass a mapping from captions to films")
     moment = most_telling(list(films.values()))
     return VideoRow([_encode_for_page(title, film, moment) for title, film in films.items()])
 
@@ -179,7 +179,7 @@ def _encode_for_page(title: str, film: Film, moment: float) -> Video:
     seconds = num_frames / film.fps
     if seconds > MAX_SECONDS:
         raise ValueError(
-            f"{title!r} lasts {seconds:.1f} s, a page allows {MAX_SECONDS:.0f} s: record fewer seconds."
+            f"{title!r} lasts {seconds:.1f} s, a page allows {MAX_SECONDS:.0f} s: record fewer seconds"
         )
     for quantiser in _PAGE_QUANTISERS:
         mp4 = _encode(film, quantiser)
@@ -188,15 +188,15 @@ def _encode_for_page(title: str, film: Film, moment: float) -> Video:
             return Video(title, mp4, poster, width, height, seconds)
     raise ValueError(
         f"{title!r} takes {len(mp4) / 1000:.0f} kB, a page allows {MAX_BYTES / 1000:.0f} kB: "
-        "record fewer seconds or smaller frames."
+        "record fewer seconds or smaller frames"
     )
 
 
 def _encode(film: Film, quantiser: int) -> bytes:
-    """The film as the bytes of an MP4 file; a larger quantiser (0 to 51) makes it smaller and coarser."""
+    """Return the film as the bytes of an MP4 file; a larger quantiser (0 to 51) makes it smaller and coarser."""
     height, width = film.frames.shape[1:3]
     if height % 2 or width % 2:
-        raise ValueError(f"Width and height must be even for 4:2:0 colour, got {width} × {height}.")
+        raise ValueError(f"width and height must be even for 4:2:0 colour, got {width} × {height}")
     data: bytes = _mediapy().compress_video(
         film.frames,
         codec="h264",
@@ -226,18 +226,18 @@ def require_encoder() -> None:
 
 
 def _mediapy() -> Any:
-    """The library mediapy, told to use the ffmpeg that imageio-ffmpeg brings."""
+    """Return the library mediapy, told to use the ffmpeg that imageio-ffmpeg brings."""
     try:
         import imageio_ffmpeg
         import mediapy
     except ImportError as error:
-        raise RuntimeError(f"Videos need {error.name}: pip install '.[video]' in the source tree") from error
+        raise RuntimeError(f"videos need {error.name}: pip install '.[video]' in the source tree") from error
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError as error:
         raise RuntimeError(
-            "No ffmpeg was found to encode videos: pip install --force-reinstall imageio-ffmpeg "
-            "(its wheel brings one), or set IMAGEIO_FFMPEG_EXE to the path of yours."
+            "no ffmpeg was found to encode videos: pip install --force-reinstall imageio-ffmpeg "
+            "(its wheel brings one), or set IMAGEIO_FFMPEG_EXE to the path of yours"
         ) from error
     return mediapy
 

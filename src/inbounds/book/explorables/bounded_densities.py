@@ -84,7 +84,7 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
     """Gaussian clipped by the simulator, Beta, and logit-normal on one box, over μ and σ.
 
     The box is [-1, 1], the control range of every joint of Gymnasium's HalfCheetah (a fraction of full torque). How
-    the three laws are matched is told in :class:`MatchedLaws`. σ runs from 0.05 to e, the cap the source thesis sets.
+    the three laws are matched is told in `MatchedLaws`. σ runs from 0.05 to e, the cap the source thesis sets.
 
     Args:
         mu: Initial μ, in [-4, 4].
@@ -141,7 +141,7 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
 
 
 def _add_atoms(fig: Any) -> None:
-    """Bars beside the two bounds for the Gaussian's mass there, on an axis of probability at the right."""
+    """Draw bars beside the two bounds for the Gaussian's mass there, on an axis of probability at the right."""
     fig.renderers.extend(Span(location=bound, dimension="height", line_width=1) for bound in (-1.0, 1.0))
     fig.extra_y_ranges = {"mass": Range1d(0.0, 1.0)}
     fig.add_layout(
@@ -163,7 +163,7 @@ def _add_atoms(fig: Any) -> None:
 
 
 def _bounded_densities_figure(laws: MatchedLaws) -> Figure:
-    """The static figure of :func:`bounded_densities`."""
+    """Draw the static figure of `bounded_densities`."""
     inside = np.linspace(-1.0, 1.0, 2003)[1:-1]
     m, s = laws.gaussian
     alpha, beta = laws.beta

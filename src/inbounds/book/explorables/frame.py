@@ -1,14 +1,14 @@
 """The frame every explorable stands in: HTML, scripts, ids, static figure, controls.
 
 An explorable is three things: a model in JavaScript, a pure function from control values to curves, table cells and
-a sentence (``<name>.js`` beside this file); a Bokeh layout with the controls and the empty curves; and a static
-figure for print, for readers without JavaScript, and for the moment before BokehJS is there. :class:`Explorable`
+a sentence (`<name>.js` beside this file); a Bokeh layout with the controls and the empty curves; and a static
+figure for print, for readers without JavaScript, and for the moment before BokehJS is there. `Explorable`
 joins them.
 
 Where BokehJS comes from:
 
-- While the book is built (``INBOUNDS_BOOK_BUILD=1``) the output holds no script. The page that contains
-  ``class="inbounds-explorable"`` loads :func:`javascript_files`, which the build copies into ``_static``.
+- While the book is built (`INBOUNDS_BOOK_BUILD=1`) the output holds no script. The page that contains
+  `class="inbounds-explorable"` loads `javascript_files`, which the build copies into `_static`.
 - In a live notebook every output carries the scripts, but the browser runs only the first: rerunning or deleting
   one cell never leaves the others dead.
 """
@@ -54,7 +54,7 @@ DASHES: dict[str, list[int]] = {"-": [], "--": [9, 4], "-.": [9, 4, 2, 4], ":": 
 
 
 def javascript_files() -> list[Path]:
-    """The scripts an explorable needs, in the order in which a page must load them.
+    """Return the scripts an explorable needs, in the order in which a page must load them.
 
     The first two are BokehJS as the installed Bokeh ships it; the rest are this package's own.
 
@@ -94,9 +94,9 @@ class Explorable:
     plots: tuple[figure, ...]
     """Bokeh figures; their data sources and ranges are named like the model's results."""
     columns: Mapping[str, str]
-    """Columns of the table: a key of ``looks`` (which gives colour and line style) and heading."""
+    """Columns of the table: a key of `looks` (which gives colour and line style) and heading."""
     rows: Mapping[str, str]
-    """Rows of the table: key in the model's ``table``, and heading."""
+    """Rows of the table: key in the model's `table`, and heading."""
     fallback: Callable[[], Figure]
     """Draws the static figure at the initial values."""
     looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.LOOKS)
@@ -112,7 +112,7 @@ class Explorable:
             control.js_on_change("value", CustomJS(code="inbounds.refresh(cb_obj.document)"))
 
     def __repr__(self) -> str:
-        """A line that never changes: what a notebook without a browser keeps of it."""
+        """Return a line that never changes: what a notebook without a browser keeps of it."""
         return f"Explorable: {self.title}. {self.alt}"
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
@@ -140,7 +140,7 @@ class Explorable:
         )
 
     def html(self, *, live: bool) -> str:
-        """The explorable as HTML.
+        """Return the explorable as HTML.
 
         Args:
             live: Carry the scripts along, for a notebook; False leaves them to the page (see the module's text).
@@ -158,7 +158,7 @@ class Explorable:
         )
 
     def _table(self) -> str:
-        """The table of read-outs; its header is the legend of the plot."""
+        """Return the table of read-outs; its header is the legend of the plot."""
         heads = "".join(
             f'<th scope="col">{_swatch(key, self.looks[key])}{text}</th>'
             for key, text in self.columns.items()
@@ -199,7 +199,7 @@ def _with_fixed_ids(item: Any, name: str) -> Any:
 
 @functools.cache
 def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
-    """The style of an explorable, with the colours of its curves for both themes."""
+    """Return the style of an explorable, with the colours of its curves for both themes."""
     curves = {
         "light": {name: look.color for name, look in looks},
         "dark": {name: look.color_on_dark for name, look in looks},
@@ -216,7 +216,7 @@ def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
 
 @functools.cache
 def _scripts() -> str:
-    """All scripts in one element that runs each at most once per page."""
+    """Return all scripts in one element that runs each at most once per page."""
     texts = [path.read_text(encoding="utf-8") for path in javascript_files()]
     sources = json.dumps(texts, ensure_ascii=False).replace("</", "<\\/")
     load = (
@@ -231,7 +231,7 @@ def _scripts() -> str:
 
 
 def _swatch(name: str, look: figures.FamilyStyle) -> str:
-    """A short line in a curve's colour and dash."""
+    """Return a short line in a curve's colour and dash."""
     dashes = " ".join(map(str, DASHES[look.linestyle]))
     return (
         '<svg width="44" height="6" aria-hidden="true"><line x1="0" y1="3" x2="44" y2="3" stroke-width="3" '
@@ -242,7 +242,7 @@ def _swatch(name: str, look: figures.FamilyStyle) -> str:
 def slider(
     name: str, title: str, start: float, end: float, value: float, step: float, *, log: bool = False
 ) -> Slider:
-    """A slider that sets one argument of the model.
+    """Return a slider that sets one argument of the model.
 
     Args:
         name: The model's argument.
@@ -264,7 +264,7 @@ def slider(
 def plot(
     x_label: str, y_label: str, x_range: tuple[float, float], y_name: str, *, height: int = 320
 ) -> figure:
-    """An empty Bokeh figure as wide as the page, without tools, whose y range the model sets under ``y_name``."""
+    """Return an empty Bokeh figure as wide as the page, without tools, whose y range the model sets under `y_name`."""
     fig = figure(
         height=height, sizing_mode="stretch_width", toolbar_location=None, tools="",
         x_range=Range1d(*x_range), y_range=Range1d(0, 1, name=y_name), x_axis_label=x_label, y_axis_label=y_label,
@@ -277,7 +277,7 @@ def plot(
 
 
 def family_curve(fig: figure, family: str) -> None:
-    """Add a policy family's curve, empty; the model fills the source of the same name with ``x`` and ``y``."""
+    """Add a policy family's curve, empty; the model fills the source of the same name with `x` and `y`."""
     curve(fig, family, figures.LOOKS[family], source=family)
 
 
@@ -286,9 +286,9 @@ def curve(fig: figure, name: str, look: figures.FamilyStyle, *, source: str) -> 
 
     Args:
         fig: The figure.
-        name: The curve's key in the explorable's ``looks``, by which the page colours it.
+        name: The curve's key in the explorable's `looks`, by which the page colours it.
         look: Its look.
-        source: The key under which the model gives its ``x`` and ``y``; unique in the explorable.
+        source: The key under which the model gives its `x` and `y`; unique in the explorable.
     """
     data = ColumnDataSource({"x": [], "y": []}, name=source)
     fig.line("x", "y", source=data, name=name, line_width=3, line_dash=DASHES[look.linestyle])

@@ -6,7 +6,7 @@
 
     greedy_actions()
 
-The mathematics runs in the reader's browser (``explorables/greedy_action.js``) and is tested against this package.
+The mathematics runs in the reader's browser (`explorables/greedy_action.js`) and is tested against this package.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class GreedyActions:
 
     @property
     def actions(self) -> dict[str, float]:
-        """The three greedy actions, by the names of :data:`CENTRES`.
+        """The three greedy actions, by the names of `CENTRES`.
 
         Example:
             >>> {name: round(a, 2) for name, a in GreedyActions(mu=0.1, sigma=2.0).actions.items()}
@@ -147,13 +147,13 @@ def greedy_actions(mu: float = 0.3, sigma: float = 1.6) -> Explorable:
 
 
 def _add_cursor(fig: figure, source: str) -> None:
-    """A thin vertical line where a slider stands, in the colour of the axes."""
+    """Draw a thin vertical line where a slider stands, in the colour of the axes."""
     data = ColumnDataSource({"x": [], "y": []}, name=source)
     fig.line("x", "y", source=data, name="line", line_width=1, line_dash=[2, 2])
 
 
 def _static_figure(policy: GreedyActions) -> Figure:
-    """The static figure of :func:`greedy_actions`."""
+    """Draw the static figure of `greedy_actions`."""
     with figures.use_style():
         fig, axes = plt.subplots(1, 3, figsize=(figures.WIDTH, 3.4))
         inside = torch.linspace(-1, 1, 1003, dtype=torch.float64)[1:-1]
@@ -178,6 +178,6 @@ def _static_figure(policy: GreedyActions) -> Figure:
 
 
 def _centres(mu: np.ndarray, sigma: np.ndarray) -> dict[str, np.ndarray]:
-    """The three actions at many parameters, `[N]` each."""
+    """Return the three actions at many parameters, `[N]` each."""
     law = LogitNormal(torch.from_numpy(mu), torch.from_numpy(sigma), low=-1.0, high=1.0)
     return {name: getattr(law, name).numpy() for name in CENTRES}

@@ -6,7 +6,7 @@
 
     ppo_clip()
 
-The mathematics runs in the reader's browser (``explorables/ppo_clip.js``) and is tested against this package's
+The mathematics runs in the reader's browser (`explorables/ppo_clip.js`) and is tested against this package's
 `inbounds.learning.ppo.clipped_surrogate` and its derivative by autograd.
 """
 
@@ -60,7 +60,7 @@ def surrogate_and_slope(
 
 
 def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2) -> Explorable:
-    """The clipped surrogate of one step, with its two candidates, over r, Â and ε.
+    """Show the clipped surrogate of one step, with its two candidates, over r, Â and ε.
 
     Args:
         ratio: Initial r, in [0, 2.5].
@@ -116,7 +116,7 @@ def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2
 
 
 def _static(ratio: float, advantage: float, clip_range: float) -> Figure:
-    """The static figure of :func:`ppo_clip`."""
+    """Draw the static figure of `ppo_clip`."""
     r = np.linspace(0.0, 2.5, 501)
     clipped = np.clip(r, 1 - clip_range, 1 + clip_range) * advantage
     drawn = {"unclipped": r * advantage, "clipped": clipped}

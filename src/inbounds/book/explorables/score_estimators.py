@@ -6,7 +6,7 @@
 
     score_estimators()
 
-The mathematics runs in the reader's browser (``explorables/score_estimators.js``) and is tested against this module.
+The mathematics runs in the reader's browser (`explorables/score_estimators.js`) and is tested against this module.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class OneStep:
         return found
 
     def _nodes(self) -> tuple[Tensor, Tensor]:
-        """Nodes z `[N]`, none on a bound, and their weights under the Normal."""
+        """Return nodes z `[N]`, none on a bound, and their weights under the Normal."""
         edges = np.array([self.mu - 12 * self.sigma, -1.0, 1.0, self.mu + 12 * self.sigma])
         edges = np.clip(edges, edges[0], edges[3])  # a bound 12 σ away leaves its piece empty
         x, w = np.polynomial.legendre.leggauss(300)
@@ -169,7 +169,7 @@ def score_estimators(
 
 
 def _panel(key: str, label: str, height: int) -> figure:
-    """One plot against μ: a curve per estimator and a line at the slider's μ."""
+    """Draw one plot against μ: a curve per estimator and a line at the slider's μ."""
     fig = plot("location μ (the box is [−1, 1])", label, (-2.4, 2.4), key, height=height)
     marker = ColumnDataSource({"x": [], "y": []}, name=f"at-{key}")
     fig.line("x", "y", source=marker, name="line", line_width=1)
@@ -179,7 +179,7 @@ def _panel(key: str, label: str, height: int) -> figure:
 
 
 def _static(step: OneStep) -> Figure:
-    """The static figure of :func:`score_estimators`."""
+    """Draw the static figure of `score_estimators`."""
     locs = np.linspace(-2.4, 2.4, 121)
     found = [OneStep(loc, step.sigma, step.peak, step.share).moments() for loc in locs]
     with figures.use_style():

@@ -57,7 +57,7 @@ class Curve:
 
 
 def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel: str = "return") -> Figure:
-    """Learning curves with bands: a panel per environment, a line per policy family.
+    """Draw learning curves with bands: a panel per environment, a line per policy family.
 
     Args:
         curves: per environment and family (a key of `LOOKS`) its curve, or None where the cell is missing.
@@ -121,7 +121,7 @@ def interval_panels(
     xlabel: str = "mean return over the last 10 % of epochs",
     reference: float | None = None,
 ) -> Figure:
-    """Point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
+    """Draw point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
 
     Args:
         panels: per panel and family its estimate, or None where the cell is missing; a family that one panel names
@@ -156,7 +156,7 @@ def difference_panels(
     *,
     xlabel: str = "difference of returns",
 ) -> Figure:
-    """Differences between families with interval bars: a panel per environment, a row per pair.
+    """Draw differences between families with interval bars: a panel per environment, a row per pair.
 
     Args:
         panels: per environment and pair (first, second) of families their comparison, first minus second.
@@ -256,7 +256,7 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
 def performance_profiles(
     profiles: Mapping[str, Profile | None], *, xlabel: str = "normalised score τ"
 ) -> Figure:
-    """Performance profiles with bands: the share of runs that score more than τ, a line per policy family.
+    """Draw performance profiles with bands: the share of runs that score more than τ, a line per policy family.
 
     Args:
         profiles: per family its profile, or None where it is missing.

@@ -82,7 +82,7 @@ def without_scale(ax: Any, axis: Literal["x", "both"]) -> None:
 
 
 def family_legend(fig: Figure, families: list[str]) -> None:
-    """One legend above all panels, of every family that has a place in the figure."""
+    """Put one legend above all panels, of every family that has a place in the figure."""
     handles = [plt.Line2D([], [], marker=LOOKS[family].marker, **family_style(family)) for family in families]
     fig.legend(handles=handles, loc="outside upper center", ncols=2 if len(families) in (2, 4) else 3)
 

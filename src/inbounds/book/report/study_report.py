@@ -42,7 +42,7 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
     """Write the report as one HTML file that needs no other.
 
     Args:
-        outcomes: what there is of the study.
+        outcomes: of the study.
         path: of the file; its folder is made if missing.
 
     Returns:

@@ -59,7 +59,7 @@ class DialFolder:
         return self.work / f"{cell.id}.parquet"
 
     def finished(self, cell: DialCell) -> bool:
-        """Whether a cell's rows are there, of this configuration."""
+        """Return whether a cell's rows are there, of this configuration."""
         path = self.cell_file(cell)
         if not path.is_file():
             return False
@@ -91,7 +91,7 @@ def plain(cell: DialCell) -> dict[str, Any]:
 
 
 def is_of(cell: DialCell, stored: dict[str, Any]) -> bool:
-    """Whether a stored `plain` is a cell's; an option that is not named there had its default."""
+    """Return whether a stored `plain` is a cell's; an option that is not named there had its default."""
     config = {name: value for name, value in stored.items() if name != "task"}
     return stored["task"] == vars(cell.task) and not changed_fields(cell.config, config)
 

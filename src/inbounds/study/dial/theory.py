@@ -72,7 +72,7 @@ def _ascended(task: DialTask, family: str, outputs: Pair, step: Pair) -> Pair:
 
 
 def _geometry(task: DialTask, family: str, outputs: Pair, rates: Rates) -> Pair:
-    """One part of an epoch along the natural gradient."""
+    """Return the outputs after one part of an epoch along the natural gradient."""
     gradient = _gradient(task, family, outputs)
     natural = np.linalg.lstsq(information(family, outputs), gradient, rcond=1e-12)[0]
     length = math.sqrt(max(float(gradient @ natural), 0.0))
@@ -84,7 +84,7 @@ def _geometry(task: DialTask, family: str, outputs: Pair, rates: Rates) -> Pair:
 
 
 def _steps(task: DialTask, family: str, outputs: Pair, rates: Rates, free_step: float | None) -> Pair:
-    """One part of an epoch with steps of Adam's length in each output, shortened where the clip would."""
+    """Return the outputs after one part of an epoch, each moved by Adam's step, or less where the clip allows less."""
     own = rates.output_step / task.dims
     reach = np.array([own, own if free_step is None else min(free_step, own)])
     reach = reach * np.sign(_gradient(task, family, outputs))

@@ -168,13 +168,13 @@ def loud_starts(robots: Sequence[str]) -> Evidence:
 
 
 def sampled_error(_: Outcomes) -> list[Statement]:
-    """The sampled Fisher-vector product is off: its relative error, over seeds. For: above `OFF`."""
+    """State that the sampled Fisher-vector product is off: its relative error, over seeds. For: above `OFF`."""
     error = _over(_fisher_routes()[0], "error")
     return [Statement("relative error of the sampled product", side(error, 1, OFF), error, digits=3)]
 
 
 def sampled_time(_: Outcomes) -> list[Statement]:
-    """The sampled product takes longer: processor time over that of the closed form, over repeats. For: above 1."""
+    """State that the sampled product takes longer: its processor time over the closed form's. For: above 1."""
     ratio = _over(_fisher_routes()[1], "ratio")
     return [
         Statement("its processor time over that of the closed form", side(ratio, 1, 1.0), ratio, digits=2)

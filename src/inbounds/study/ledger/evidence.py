@@ -84,7 +84,7 @@ def side(estimate: Estimate, sign: int = 1, edge: float = 0.0) -> State:
 def beats(
     contrast: Contrast, endpoint: str = "final", robots: Sequence[str] = ROBOTS, *, below: Sequence[str] = ()
 ) -> Evidence:
-    """The first family is ahead of the second on some robots, and behind on others.
+    """State that the first family is ahead of the second on some robots, and behind on others.
 
     For: the interval of the difference leaves out 0 on that side, and the test finds it after Holm.
     Against: the same, other side.
@@ -166,7 +166,7 @@ def equals(contrast: Contrast, robots: Sequence[str], endpoint: str = "final") -
 
 
 def changes(patterns: Sequence[str], sign: int, endpoint: str = "final") -> Evidence:
-    """Cells of the fourth arm lie above (sign 1) or below (−1) the cell each is compared with."""
+    """State that cells of the fourth arm lie above (sign 1) or below (−1) the cell each is compared with."""
 
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
@@ -181,7 +181,7 @@ def changes(patterns: Sequence[str], sign: int, endpoint: str = "final") -> Evid
 
 
 def costs(patterns: Sequence[str], *, claimed: bool) -> Evidence:
-    """Cells of the fourth arm lose more than the margin (`claimed`), or do not.
+    """State that cells of the fourth arm lose more than the margin (`claimed`), or do not.
 
     The interval of the change lies below −margin (a loss that matters), above it (none that does), or is open: a loss
     that is clear but may be smaller than the margin decides nothing.
@@ -236,7 +236,7 @@ def gaps(pairs: Sequence[tuple[Column, Column]], robot: str) -> Evidence:
 
 
 def learns(column: Column, sign: int = 1) -> Evidence:
-    """A column ends above where it starts, seed by seed; sign −1: the claim is that it does not."""
+    """State that a column ends above where it starts, seed by seed; sign −1: the claim is that it does not."""
 
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
@@ -259,7 +259,7 @@ def _opposite(state: State) -> State:
 
 
 def exceeds(patterns: Sequence[str], measure: Sequence[str], edge: float, digits: int) -> Evidence:
-    """A measured quantity, summed over its columns, ends above an edge: mean of the last five measurements."""
+    """State that a measured quantity, summed over its columns, ends above an edge (mean of the last five)."""
 
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
@@ -282,7 +282,7 @@ def exceeds(patterns: Sequence[str], measure: Sequence[str], edge: float, digits
 
 
 def improves(contrasts: Sequence[Contrast]) -> Evidence:
-    """A random run of the first family does better than one of the second in more than half of all pairs."""
+    """State that a random run of the first family does better than one of the second in more than half of all pairs."""
 
     def find(outcomes: Outcomes) -> list[Statement]:
         found = []
@@ -299,5 +299,5 @@ def improves(contrasts: Sequence[Contrast]) -> Evidence:
 
 
 def together(*parts: Evidence) -> Evidence:
-    """All statements of several kinds of evidence."""
+    """Return all statements of several kinds of evidence."""
     return lambda outcomes: [statement for part in parts for statement in part(outcomes)]

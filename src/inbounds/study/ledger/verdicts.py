@@ -135,7 +135,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Finding:
-    """What there is to a claim.
+    """The judgement of a claim: its statements, and how many of the cells behind them are finished.
 
     Made by `judge`, which has an example.
     """
@@ -238,7 +238,7 @@ def judge(outcomes: Outcomes, claim: Claim) -> Finding:
     """Find the statements of a claim.
 
     Args:
-        outcomes: what there is of the study.
+        outcomes: of the study.
         claim: which.
 
     Example:

@@ -134,7 +134,7 @@ def is_alive(claim: Mapping[str, Any]) -> bool:
 
 
 def _host() -> str:
-    """The host and, where it can be told, the process namespace: numbers mean nothing in another container."""
+    """Return the host and, where it can be told, the process namespace: numbers mean nothing in another container."""
     try:
         return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
     except OSError:

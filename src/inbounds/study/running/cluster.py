@@ -118,7 +118,7 @@ def _run(
 
 
 def run_on_worker(cell: Cell, folder: StudyFolder, nice: int, deadline: float, stop_file: str) -> CellReport:
-    """Run a cell in a worker; the wish to stop is a file."""
+    """Run a cell in a worker, until a file asks it to stop."""
     if os.path.exists(stop_file) or time.time() > deadline:
         return CellReport("stopped")
     with contextlib.suppress(OSError):

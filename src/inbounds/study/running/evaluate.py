@@ -94,7 +94,7 @@ class Players:
         return policy.greedy(outputs, way)
 
     def _outputs(self, obs: NDArray[Any]) -> torch.Tensor:
-        """The networks' outputs `[S·E, 2A]` for observations `[S·E, O]`."""
+        """Return the networks' outputs `[S·E, 2A]` for observations `[S·E, O]`."""
         collector, networks = self.trainer.collector, self.trainer.networks
         by_seed = obs.reshape(-1, self.episodes, obs.shape[1]).swapaxes(
             0, 1

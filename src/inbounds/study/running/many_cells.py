@@ -179,7 +179,7 @@ class _LocalRun:
 
     @contextlib.contextmanager
     def _listening(self) -> Iterator[None]:
-        """Take signals for the wish to stop, and hand them on to the processes."""
+        """Take signals to stop, and hand them on to the processes."""
 
         def take(number: int, frame: FrameType | None) -> None:
             if self.signal:
@@ -196,15 +196,15 @@ class _LocalRun:
 def _run_in_child(
     cell: Cell, folder: StudyFolder, nice: int, deadline: float, parent: int, results: Connection
 ) -> None:
-    """A process: run the cell, send what became of it and the warnings on the way."""
-    wish: list[int] = []
-    with handling(lambda number, frame: wish.append(number)):
+    """Run the cell in a process of its own, and send what became of it and the warnings on the way."""
+    asked_to_stop: list[int] = []
+    with handling(lambda number, frame: asked_to_stop.append(number)):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         os.nice(nice)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            # A parent that was killed is a wish to stop, too: whoever comes next should find the cores free.
-            report = attempt(cell, folder, lambda: bool(wish) or os.getppid() != parent, deadline)
+            # A killed parent stops the cell, too: whoever comes next should find the cores free.
+            report = attempt(cell, folder, lambda: bool(asked_to_stop) or os.getppid() != parent, deadline)
         # A parent that is gone reads nothing.
         with contextlib.suppress(BrokenPipeError):
             results.send((report, _each_once([str(warning.message) for warning in caught])))
@@ -235,7 +235,7 @@ def commit_cell(cell: Cell, folder: StudyFolder) -> str:
 
 
 def _cores() -> int:
-    """The cores that this process may use."""
+    """Return the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

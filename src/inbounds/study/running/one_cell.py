@@ -92,7 +92,7 @@ def run_cell(
 
 
 def _is_finished(cell: Cell, folder: StudyFolder) -> bool:
-    """Whether nothing is left to do; raises where something is in the way."""
+    """Return whether nothing is left to do, and raise where something is in the way."""
     state, path = folder.state(cell), folder.cell_file(cell)
     if state == "damaged":
         raise StudyError(
@@ -130,7 +130,7 @@ class _CellRun:
         sessions.append(now | {"from_epoch": self.kept})
 
     def run(self, stop: Callable[[], bool], deadline: float) -> Ending:
-        """Go on until the end, or a wish to stop."""
+        """Go on until the end, or until asked to stop."""
         run, epochs = self.run_, self.cell.epochs
         self.claim.renew(epoch=run.done, epochs=epochs)
         try:

@@ -95,7 +95,7 @@ class StudyProgress:
 
 
 def status_table(cells: Sequence[Cell], folder: StudyFolder) -> Table:
-    """Return what there is of each cell, one row per arm and robot that is not all missing, as a table to print."""
+    """Return a table of cells by their state, one row for each arm and robot."""
     table = Table("arm", "robot", "finished", "running", "begun", "missing", "damaged or other")
     groups: dict[tuple[str, str], Counter[str]] = {}
     for cell in cells:

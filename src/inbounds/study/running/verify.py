@@ -151,7 +151,7 @@ def check_cells(cells: Sequence[Cell], folder: StudyFolder) -> list[Checked]:
 
 
 def _wrong(cell: Cell, folder: StudyFolder) -> str:
-    """What is wrong with the contents of a cell's files, the first thing; empty where nothing is."""
+    """Return what is wrong with the contents of a cell's files, the first thing; empty where nothing is."""
     path, (policies, returns) = folder.cell_file(cell), folder.policy_files(cell)
     tables: list[tuple[Path, Callable[[Cell, pa.Table], str]]] = [(path, file_checks.wrong_rows)]
     if cell.keeps_policies and returns.is_file():
