@@ -96,7 +96,7 @@ def attach(clocks: Clocks, trainer: Any) -> list[tuple[Any, str, Any]]:
     collector, envs = trainer.collector, trainer.envs
     parts: list[tuple[Any, str, str]] = [
         (collector, "collect", "acting"),
-        (collector.networks.actor, "act", "acting: network"),
+        (collector, "_act", "acting: network"),
         (envs, "step", "robots: task, resets, infos"),
         (envs._batch, "step", "robots: physics"),
         (envs.task, "feel_contacts", "robots: contact forces"),
