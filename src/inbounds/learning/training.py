@@ -289,8 +289,8 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
         make_envs: as `Trainer` takes it.
 
     Returns:
-        Seconds it took: some ten the first time, less than one later, where there is a place to keep what is compiled
-        (the package's folder, or the user's cache).
+        How many seconds it took, some ten the first time and less than one later, where there is a place to keep what
+        is compiled (the package's folder, or the user's cache).
 
     Example:
         >>> prepare(TrainConfig("Swimmer-v5")) < 1  # nothing to compile for autograd
