@@ -48,6 +48,16 @@ class Column(NamedTuple):
         own = any((cell.algorithm, cell.family) == (algorithm, family) for cell in ARMS[arm])
         return cls(arm if own else "standard", algorithm, family)
 
+    def cell_id(self, robot: str) -> str:
+        """Return the id of the column's cell on a robot.
+
+        Example:
+            >>> Column("standard", "ppo", "beta").cell_id("Hopper")
+            'standard-hopper-ppo-beta'
+        """
+        parts = (self.arm, robot.lower(), self.algorithm, self.family, self.variant)
+        return "-".join(part for part in parts if part)
+
     @property
     def baseline(self) -> Column:
         """What a column of the fourth arm is compared with: nothing changed in it."""
@@ -255,5 +265,4 @@ class Outcomes:
             >>> outcomes.find(Column("standard", "ppo", "beta"), "Hopper").returns.shape
             (10, 500)
         """
-        parts = (column.arm, robot.lower(), column.algorithm, column.family, column.variant)
-        return self.finished.get("-".join(part for part in parts if part))
+        return self.finished.get(column.cell_id(robot))

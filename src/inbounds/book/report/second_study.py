@@ -16,7 +16,7 @@ from inbounds.book.drawing.figures import LOOKS, WIDTH, use_style
 from inbounds.book.report import html
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
-from inbounds.study.grid import ROBOTS, SECOND, second_cells
+from inbounds.study.grid import FREE, ROBOTS, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
     GAUSSIAN,
@@ -51,9 +51,9 @@ def column_name(column: Column) -> str:
         >>> column_name(Column("equal", "ppo", "gaussian", "free-std"))
         'Gaussian free σ'
     """
-    free = column.variant == "free-std" or (column.arm == "steps" and column.family == "gaussian")
+    free = column.variant == FREE or (column.arm == "steps" and column.family == "gaussian")
     sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
-    changed = "" if column.variant in ("", "free-std") else f", {column.variant.replace('-', ' ', 1)}"
+    changed = "" if column.variant in ("", FREE) else f", {column.variant.replace('-', ' ', 1)}"
     return f"{SHORT[column.family]}{sigma}{changed}"
 
 

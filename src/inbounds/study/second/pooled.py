@@ -11,18 +11,22 @@ from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
 MORE_SEEDS_OF = {"equal": "equal-more"}  # arm → the arm with the same columns and other seeds
 
 
+def _parts(column: Column) -> list[Column]:
+    """Return the columns that hold seeds of one: itself, and that of the arm with further seeds."""
+    further = MORE_SEEDS_OF.get(column.arm)
+    return [column, column._replace(arm=further)] if further else [column]
+
+
 def pooled(outcomes: Outcomes, column: Column, robot: str) -> list[Outcome]:
     """Return the finished cells of a column on a robot: one, or two where the arm has further seeds."""
-    arms = (column.arm, MORE_SEEDS_OF.get(column.arm, ""))
-    found = (outcomes.find(column._replace(arm=arm), robot) for arm in arms if arm)
+    found = (outcomes.find(part, robot) for part in _parts(column))
     return [outcome for outcome in found if outcome is not None]
 
 
 def is_whole(outcomes: Outcomes, column: Column, robot: str) -> bool:
     """Return whether every cell that the plan has of a column on a robot is finished."""
-    arms = (column.arm, MORE_SEEDS_OF.get(column.arm, ""))
-    ids = ("-".join(filter(None, (arm, robot.lower(), *column[1:]))) for arm in arms if arm)
-    planned = [i for i in ids if i in outcomes.states]
+    ids = (part.cell_id(robot) for part in _parts(column))
+    planned = [name for name in ids if name in outcomes.states]
     return bool(planned) and all(outcomes.states[i] == "finished" for i in planned)
 
 

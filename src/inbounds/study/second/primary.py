@@ -12,6 +12,7 @@ from typing import Literal
 from inbounds.study import statistics
 from inbounds.study.analysis import generator_for, marked
 from inbounds.study.cell import ROBOTS, SECOND_VERSION
+from inbounds.study.grid import FREE
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.pooled import is_whole, pooled, pooled_scores
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
@@ -22,7 +23,7 @@ RESAMPLES = 100_000
 PERMUTATIONS = 99_999
 BOUNDED = ("logit-normal", "beta")
 """The laws that are compared with the Gaussian."""
-GAUSSIAN = Column("equal", "ppo", "gaussian", "free-std")
+GAUSSIAN = Column("equal", "ppo", "gaussian", FREE)
 
 Finding = Literal["confirmed", "contradicted", "refuted", "undecided", ""]
 

@@ -15,12 +15,12 @@ import numpy as np
 from inbounds.study import statistics
 from inbounds.study.analysis import scores
 from inbounds.study.cell import ROBOTS
+from inbounds.study.grid import FREE
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.primary import Gap, gap
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Comparison, Equivalence
 
-FREE = "free-std"
 _GAUSSIAN, _FREE = ("gaussian", ""), ("gaussian", FREE)
 _BETA, _LOGIT, _LOGIT_FREE = ("beta", ""), ("logit-normal", ""), ("logit-normal", FREE)
 
