@@ -15,8 +15,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from inbounds.book.pages.cells import read_cells
 from inbounds.book.pages.contents import contents
-from inbounds.book.pages.counts import HIDDEN, Counts, count, read_cells
+from inbounds.book.pages.counts import HIDDEN, Counts, count_page
 
 ROOT = Path(__file__).resolve().parents[1]
 CUT = {
@@ -71,11 +72,11 @@ def complaints(root: Path, budgets: Mapping[str, Any]) -> Iterator[str]:
         if name not in core:
             yield f"{name}: listed as rewritten, but no core chapter of _toc.yml has this name"
             continue
-        cells = read_cells(root / "notebooks" / f"{name}.ipynb")
+        notebook = root / "notebooks" / f"{name}.ipynb"
         budget = budgets["core"] | budgets.get("chapters", {}).get(name, {})
-        counted[name] = count(cells)
+        counted[name] = count_page(notebook)
         yield from too_much(name, counted[name], budget)
-        yield from misplaced(name, cells, budget["check"])
+        yield from misplaced(name, read_cells(notebook), budget["check"])
     for group, limit in budgets.get("together", {}).items():
         if set(limit["chapters"]) <= set(counted):
             total = sum(counted[name].words for name in limit["chapters"])
@@ -89,7 +90,7 @@ def table(root: Path, budgets: Mapping[str, Any], names: list[str]) -> Iterator[
     yield f"{'page':<28}{'kind':<12}{'words':>7}{'lines':>7}{'proofs':>8}{'intervals':>11}{'minutes':>9}"
     pages = contents(root / "_toc.yml")
     for name in names or [*pages.core, *pages.depth]:
-        found = count(read_cells(root / "notebooks" / f"{name}.ipynb"))
+        found = count_page(root / "notebooks" / f"{name}.ipynb")
         kind = "rewritten" if name in budgets["rewritten"] else pages.kind(name)
         yield (
             f"{name:<28}{kind:<12}{found.words:>7}{found.lines:>7}{found.statements:>8}{found.intervals:>11}"
@@ -97,7 +98,7 @@ def table(root: Path, budgets: Mapping[str, Any], names: list[str]) -> Iterator[
         )
     for group, limit in budgets.get("together", {}).items() if not names else ():
         done = [name for name in limit["chapters"] if name in budgets["rewritten"]]
-        total = sum(count(read_cells(root / "notebooks" / f"{name}.ipynb")).words for name in done)
+        total = sum(count_page(root / "notebooks" / f"{name}.ipynb").words for name in done)
         yield f"{group}: {total} of {limit['words']} words, {len(done)} of {len(limit['chapters'])} chapters rewritten"
 
 

@@ -23,10 +23,14 @@ METADATA = {
     "language_info": {"name": "python"},
 }
 
+PROGRAM = "program"
+"""What a chapter says of its program (`inbounds.book.pages.programs`): the one entry of the metadata that is its own."""
+
 
 def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     """Drop heavy MIME types and whatever changes from one execution to the next without meaning anything."""
-    notebook.metadata = nbformat.from_dict(METADATA)
+    own = {PROGRAM: notebook.metadata[PROGRAM]} if PROGRAM in notebook.metadata else {}
+    notebook.metadata = nbformat.from_dict(METADATA | own)
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
         for output in cell.get("outputs", []):

@@ -10,7 +10,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 
 from inbounds.book.pages.contents import contents
-from inbounds.book.pages.counts import count, read_cells
+from inbounds.book.pages.counts import count_page
 
 KINDS = {"core": "Core chapter", "depth": "Going deeper"}
 HOW = "150 words or 15 lines of visible code a minute; without exercises and Teach it"
@@ -32,7 +32,7 @@ def say_kind(
     toc = Path(app.srcdir) / "_toc.yml"
     kind = contents(toc).kind(name) if folder == "notebooks" and toc.is_file() else ""
     if kind and "</h1>" in context.get("body", ""):
-        minutes = count(read_cells(Path(app.srcdir) / f"{pagename}.ipynb")).minutes()
+        minutes = count_page(Path(app.srcdir) / f"{pagename}.ipynb").minutes()
         context["body"] = context["body"].replace("</h1>", f"</h1>\n{line(kind, minutes)}", 1)
 
 

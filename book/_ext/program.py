@@ -1,7 +1,10 @@
-"""The directive ``{program-listing}``: a chapter's program as one file, to download, and its listing, folded.
+"""A chapter's program on its page: ``{program-listing}`` and ``{program-diff}``.
 
-It is assembled from the cells of the page on which the directive stands (`inbounds.book.pages.programs`), so that
-nothing of it stands twice; the files lie in ``_static/programs``.
+* ``{program-listing}``: the program as one file, to download, and its listing, folded.
+* ``{program-diff}``: what the chapter changes in the program that it continues, block by block.
+
+Both are assembled from the cells of the page on which the directive stands (`inbounds.book.pages.programs`), so that
+nothing stands twice; the files lie in ``_static/programs``.
 """
 
 from pathlib import Path
@@ -12,7 +15,7 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from inbounds.book.pages.programs import assemble, has_program
+from inbounds.book.pages.programs import assemble, diff, has_program
 
 FOLDER = "programs"
 
@@ -32,9 +35,25 @@ class Program(SphinxDirective):
         )
         listing = ["::::{dropdown} The whole program", "```{code-block} python"]
         listing += [*assemble(notebook).splitlines(), "```", "::::"]
-        container = nodes.container()
-        self.state.nested_parse(StringList(listing, source="program"), self.content_offset, container)
-        return [link, *container.children]
+        return [link, *parsed(self, listing)]
+
+
+class Change(SphinxDirective):
+    """What the page changes in the program so far."""
+
+    def run(self) -> list[nodes.Node]:
+        """Parse the generated Markdown in place."""
+        notebook = Path(self.env.srcdir) / f"{self.env.docname}.ipynb"
+        return parsed(self, ["```{code-block} diff", *diff(notebook).splitlines(), "```"])
+
+
+def parsed(directive: SphinxDirective, markdown: list[str]) -> list[nodes.Node]:
+    """Return what generated Markdown becomes at the place of a directive."""
+    container = nodes.container()
+    directive.state.nested_parse(
+        StringList(markdown, source="program"), directive.content_offset, container
+    )
+    return container.children
 
 
 def write_programs(app: Sphinx, exception: Exception | None) -> None:
@@ -51,5 +70,6 @@ def write_programs(app: Sphinx, exception: Exception | None) -> None:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directive (called by Sphinx)."""
     app.add_directive("program-listing", Program)
+    app.add_directive("program-diff", Change)
     app.connect("build-finished", write_programs)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

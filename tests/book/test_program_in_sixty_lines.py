@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from inbounds.book.pages.counts import read_cells
+from inbounds.book.pages.cells import read_cells
 from inbounds.book.pages.programs import EXTENSION_TAG, TAG, assemble, has_program, program_cells
 from inbounds.learning import PolicyGradientConfig, policy_gradient
 from inbounds.learning.families.policy import Policy, PolicyConfig

@@ -4,20 +4,22 @@ What counts, and what does not:
 
 * **Words** are those of the prose, folds included, without exercises, their solutions and *Teach it*. A formula is one
   word, in a line or displayed; a glued number is one word.
-* **Visible lines** are the lines with something on them of cells that show their code, and of programs in the prose.
-  Exercises do not count, nor does the listing that the directive ``{program-listing}`` folds away at a chapter's end.
+* **Visible lines** are the lines with something on them of cells that show their code, of programs in the prose, and of
+  ``{program-diff}``. Exercises do not count, nor does the listing that ``{program-listing}`` folds away at a chapter's end.
 * **Statements** are theorems, propositions, lemmas and corollaries.
 * **Intervals** are pairs of glued numbers, or glued texts with such a pair in them; a table row is no paragraph.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from inbounds.book.pages.cells import read_cells
+from inbounds.book.pages.programs import diff
 
 HIDDEN = frozenset({"hide-input", "hide-cell", "remove-input", "remove-cell"})
 """Tags of cells whose code a page does not show."""
@@ -57,10 +59,13 @@ class Counts:
         return max(1, round(self.words / 150 + self.lines / 15))
 
 
-def read_cells(path: Path) -> list[dict[str, Any]]:
-    """Return the cells of a notebook, each with its source as one text."""
-    cells = json.loads(path.read_text(encoding="utf8"))["cells"]
-    return [cell | {"source": "".join(cell["source"])} for cell in cells]
+def count_page(notebook: Path) -> Counts:
+    """Count a stored notebook, with the changes of its program where the page shows them (``{program-diff}``)."""
+    cells = read_cells(notebook)
+    found = count(cells)
+    if any(line.startswith("```{program-diff}") for line in taught(cells)[0].splitlines()):
+        found = replace(found, lines=found.lines + _filled(diff(notebook)))
+    return found
 
 
 def count(cells: Sequence[dict[str, Any]]) -> Counts:
