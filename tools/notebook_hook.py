@@ -24,7 +24,7 @@ METADATA = {
 }
 
 PROGRAM = "program"
-"""What a chapter says of its program (`inbounds.book.pages.programs`): the one entry of the metadata that is its own."""
+"""What a chapter says of its program (`inbounds.book.pages.programs`): the one entry that is its own."""
 
 
 def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:

@@ -50,9 +50,7 @@ class Change(SphinxDirective):
 def parsed(directive: SphinxDirective, markdown: list[str]) -> list[nodes.Node]:
     """Return what generated Markdown becomes at the place of a directive."""
     container = nodes.container()
-    directive.state.nested_parse(
-        StringList(markdown, source="program"), directive.content_offset, container
-    )
+    directive.state.nested_parse(StringList(markdown, source="program"), directive.content_offset, container)
     return container.children
 
 

@@ -69,7 +69,10 @@ def test_a_new_block_goes_before_what_uses_it(cell: str, order: list[str]) -> No
 
 
 def test_a_class_can_get_methods_and_stays_one_class() -> None:
-    cell = "class Point(Point):\n    def double(self):\n        return self.x + self.x\n\n    def triple(self):\n        return 3 * self.x"
+    cell = (
+        "class Point(Point):\n    def double(self):\n        return self.x + self.x\n\n"
+        "    def triple(self):\n        return 3 * self.x"
+    )
     program = grown(parts(FIRST), cell)
     text = program.blocks["Point"]
     assert text.count("class Point:") == text.count("def double") == 1
@@ -80,7 +83,10 @@ def test_a_class_can_get_methods_and_stays_one_class() -> None:
 
 
 def test_imports_are_joined_sorted_and_used() -> None:
-    more = "import torch\nfrom collections import OrderedDict\nimport gymnasium as gym\nfrom torch.nn import functional as F, Linear\nx = torch, gym, F, Linear, OrderedDict, nn"
+    more = (
+        "import torch\nfrom collections import OrderedDict\nimport gymnasium as gym\n"
+        "from torch.nn import functional as F, Linear\nx = torch, gym, F, Linear, OrderedDict, nn"
+    )
     assert text_of(grown(parts(FIRST), more)).split("\n\n\n")[0].splitlines() == [
         "import math", "from collections import OrderedDict", "",
         "import gymnasium as gym", "import torch", "from torch import nn",  # Tensor: nothing uses it
@@ -115,7 +121,9 @@ def test_a_chapter_continues_another(tmp_path: Path) -> None:
 def test_the_diff_names_the_blocks_that_changed(tmp_path: Path) -> None:
     chapter(tmp_path, "one", FIRST, "def spare():\n    return 1")
     cells = "c = 1", "def half(x):\n    return x / 2.0"
-    two = chapter(tmp_path, "two", *cells, continues="one", drops=["spare"], prose="# T\n\n```{program-diff}\n```")
+    two = chapter(
+        tmp_path, "two", *cells, continues="one", drops=["spare"], prose="# T\n\n```{program-diff}\n```"
+    )
     lines = programs.diff(two).splitlines()
     assert [line for line in lines if line.startswith("@@")] == ["@@ half @@", "@@ c @@", "@@ spare @@"]
     assert "-    return x / 2" in lines
@@ -131,7 +139,10 @@ def test_the_diff_names_the_blocks_that_changed(tmp_path: Path) -> None:
 def test_far_apart_changes_of_a_block_are_told_apart() -> None:
     long = "def f():\n" + "\n".join(f"    x{i} = {i}" for i in range(20))
     found = difference(parts(long), parts(long.replace("x1 ", "y ").replace("x18", "z")))
-    assert [line for line in found.splitlines() if line.startswith("@@")] == ["@@ f @@", "@@ f, further down @@"]
+    assert [line for line in found.splitlines() if line.startswith("@@")] == [
+        "@@ f @@",
+        "@@ f, further down @@",
+    ]
     assert difference(parts(long), parts(long)) == ""
     assert difference(Program(), parts("import os\nx = os")).startswith("@@ imports @@\n+import os\n@@ x @@")
 
@@ -181,7 +192,9 @@ def test_every_policy_trains_on_every_robot(name: str, robot: str) -> None:
     box = gym.make(robot).action_space
     for policy in program["POLICIES"].values():
         scores: list[int] = []
-        learned = program["train"](robot, policy, epochs=1, tell=lambda _, score, to=scores: to.append(score))[0]
+        learned = program["train"](
+            robot, policy, epochs=1, tell=lambda _, score, to=scores: to.append(score)
+        )[0]
         obs, _ = gym.make(robot).reset(seed=0)
         action = learned.to_box(learned.sample(program["torch"].tensor(obs).float()))
         assert len(scores) == 1

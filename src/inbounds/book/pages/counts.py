@@ -4,8 +4,8 @@ What counts, and what does not:
 
 * **Words** are those of the prose, folds included, without exercises, their solutions and *Teach it*. A formula is one
   word, in a line or displayed; a glued number is one word.
-* **Visible lines** are the lines with something on them of cells that show their code, of programs in the prose, and of
-  ``{program-diff}``. Exercises do not count, nor does the listing that ``{program-listing}`` folds away at a chapter's end.
+* **Visible lines** are the lines with something on them of cells that show their code, of programs in the prose, and
+  of ``{program-diff}``. Exercises do not count, nor does the listing that ``{program-listing}`` folds away.
 * **Statements** are theorems, propositions, lemmas and corollaries.
 * **Intervals** are pairs of glued numbers, or glued texts with such a pair in them; a table row is no paragraph.
 """
