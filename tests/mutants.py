@@ -20,6 +20,20 @@ class Mutant:
 
 MUTANTS: tuple[Mutant, ...] = (
     Mutant(
+        "a quiet start forgets the box's units",
+        "integrations/stable_baselines3.py",
+        "policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())",
+        "policy.log_std.fill_(math.log(quiet_scale(ClippedNormal, std)))",
+        "tests/integrations/test_quiet.py::test_models_of_the_peer_start_so_in_a_lopsided_box",
+    ),
+    Mutant(
+        "a missing package is no failure",
+        "cli/classroom/doctor.py",
+        '"optional" if extra else "missing",',
+        '"optional",',
+        "tests/cli/test_doctor.py::test_a_missing_package_and_an_old_one_are_named",
+    ),
+    Mutant(
         "the Jacobian is dropped",
         "distributions/logit_normal.py",
         "log_density = self._normal().log_prob(latent) + log_jacobian",

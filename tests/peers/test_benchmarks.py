@@ -152,5 +152,11 @@ def test_the_readme_quotes_what_was_measured() -> None:
         if bar.theirs == "rltools-ppo"
     }
     assert dict((env, n) for n, env in re.findall(r"(\d+\.\d\d) on\s+(\w+)", quoted)) == over_rltools
+    alone = [
+        np.median(report.ratio(results, env, "inbounds-compiled-1", "rltools-ppo"))
+        for env in results["measurements"]
+    ]
+    assert f"at {min(alone):.2f} to {max(alone):.2f} of its" in quoted
+    assert max(alone) < 1  # "RLtools is ahead"
     found = re.findall(r"(\d+\.\d) on\s+(\w+)( under TRPO)?", quoted)
     assert {(env, "TRPO" if trpo else "PPO"): number for number, env, trpo in found} == measured

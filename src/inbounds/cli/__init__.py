@@ -1,4 +1,4 @@
-"""The command `inbounds`: train, watch, bench, study; `inbounds --version` says which one it is.
+"""The command `inbounds`: train, watch, bench, study, doctor, grade; `inbounds --version` says which one it is.
 
 >>> main(["watch", "no/such/run"])  # what to do instead goes to standard error
 1
@@ -36,6 +36,11 @@ EXAMPLES = {
   inbounds study report --out report.html
   inbounds study verify --random 2 --epochs 20
   inbounds study dial --help      (a task with three knobs: when does the law matter?)""",
+    "doctor": """\
+  inbounds doctor""",
+    "grade": """\
+  inbounds grade lab/04_beta_policies.ipynb
+  inbounds grade handed-in --seconds 300 --out grades.csv""",
 }
 
 
@@ -70,6 +75,7 @@ def _run(args: list[str]) -> int:
         return 0
     # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
     from inbounds.cli import benchmark, options, training, watching
+    from inbounds.cli.classroom import doctor, grading
     from inbounds.headless import BackendError
 
     try:
@@ -84,6 +90,10 @@ def _run(args: list[str]) -> int:
             return training.run(command)
         if isinstance(command, options.Watch):
             return watching.run(command)
+        if isinstance(command, options.Doctor):
+            return doctor.run()
+        if isinstance(command, options.Grade):
+            return grading.run(command.notebooks, command.seconds, command.gigabytes, command.out)
         return benchmark.run([])
     except SystemExit as exit_:  # tyro has written its help, or what is wrong
         if is_unread(exit_):

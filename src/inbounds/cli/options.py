@@ -173,8 +173,41 @@ class Study:
     """
 
 
-Command: TypeAlias = Train | Watch | Bench | Study
-COMMANDS: dict[str, type[Command]] = {"train": Train, "watch": Watch, "bench": Bench, "study": Study}
+@dataclass(frozen=True)
+class Doctor:
+    """Look at this machine and say how to mend what is missing.
+
+    Python, packages and extras, disk, OpenGL, the encoder of films, and two seconds of training.
+    """
+
+
+@dataclass(frozen=True)
+class Grade:
+    """Run a class's notebooks and tell what their graders say, by notebook and exercise.
+
+    Each notebook runs in a process of its own, with limits to time and memory. This is no sandbox: a notebook may read
+    and write whatever you may.
+    """
+
+    notebooks: Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE|FOLDER ...")]
+    """Notebooks, or folders of them: the student's copies of `make lab`."""
+    seconds: float = 600.0
+    """That a notebook may take."""
+    gigabytes: float = 6.0
+    """That a notebook may allocate."""
+    out: Path | None = None
+    """A CSV file for the table."""
+
+
+Command: TypeAlias = Train | Watch | Bench | Study | Doctor | Grade
+COMMANDS: dict[str, type[Command]] = {
+    "train": Train,
+    "watch": Watch,
+    "bench": Bench,
+    "study": Study,
+    "doctor": Doctor,
+    "grade": Grade,
+}
 
 
 def parse(args: Sequence[str]) -> Command:

@@ -10,8 +10,9 @@ saturated action is scored exactly, its density cancels in every ratio, and an a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium
 import numpy as np
@@ -19,19 +20,23 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from inbounds.distributions import LogitNormal
+from inbounds.distributions import ClippedNormal, LogitNormal
 from inbounds.distributions.bounds import require_bounds
 from inbounds.distributions.boxes import require_box
+from inbounds.integrations.quiet import quiet_scale
 
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
+    from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
     from stable_baselines3.common.policies import ActorCriticPolicy
 except ImportError as error:
     raise ImportError(
         'stable-baselines3 is not installed: pip install ".[integrations]" in the source tree'
     ) from error
 
-__all__ = ["LogitNormalDistribution", "LogitNormalPolicy"]
+__all__ = ["LogitNormalDistribution", "LogitNormalPolicy", "quiet_start"]
+
+Model = TypeVar("Model", bound=OnPolicyAlgorithm)
 
 
 class LogitNormalDistribution(DiagGaussianDistribution):
@@ -139,3 +144,43 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
         box: Any = self.action_space
         return box.low, box.high
+
+
+def quiet_start(model: Model, std: float = 0.4) -> Model:
+    """Centre an untrained policy in its box and give its actions the standard deviation std; call it before `learn`.
+
+    The peer starts with log σ = 0, in the box's units for its own Gaussian, whatever the box. What is set here is the
+    free log σ and the bias of the head of μ, nothing else; both are learned from there.
+
+    Args:
+        model: PPO, A2C or TRPO with the peer's own Gaussian or with `LogitNormalPolicy`, on a bounded box.
+        std: of the executed action, clipped or squashed, in units of half the action range.
+
+    Returns:
+        The same model.
+
+    Raises:
+        ValueError: a policy of another kind, or a std out of reach.
+
+    Example:
+        >>> from stable_baselines3 import PPO
+        >>> model = quiet_start(PPO("MlpPolicy", "Pendulum-v1", n_steps=64, device="cpu", seed=0))
+        >>> round(model.policy.log_std.exp().item(), 3)  # N·m, of a box of ±2: 0.4 of half the range, when clipped
+        0.821
+    """
+    policy: Any = model.policy
+    kind = type(getattr(policy, "action_dist", policy))
+    if kind not in (DiagGaussianDistribution, LogitNormalDistribution):
+        raise ValueError(
+            f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
+        )
+    box: Any = model.action_space
+    low, high = require_bounds(box.low, box.high)
+    with torch.no_grad():
+        if kind is LogitNormalDistribution:
+            policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))
+            policy.action_net.bias.zero_()
+        else:
+            policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())
+            policy.action_net.bias.copy_((high + low) / 2)
+    return model

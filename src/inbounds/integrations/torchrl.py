@@ -9,6 +9,9 @@ environment:
     loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
     batch = env.rollout(1000, acting)       # writes both, and "action"
 
+A quiet start is the extractor's first scale: with σ = `inbounds.integrations.quiet.quiet_scale(LogitNormal, 0.4)`, end
+the network in `NormalParamExtractor(scale_mapping=f"biased_softplus_{σ}")`.
+
 Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: a
 NaN, or an action beyond its bounds, then raises nothing. `torch.distributions.Distribution.set_default_validate_args`
 switches them on again.

@@ -1,0 +1,188 @@
+"""`inbounds grade`: what the graders say to the notebooks of a class, by student and exercise."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import track
+from rich.table import Table
+
+from inbounds.cli.errors import CommandError
+
+_GRADER = re.compile(r"\bgraders\.(\w+)\(")
+
+
+@dataclass(frozen=True)
+class Grade:
+    """What became of one exercise of one notebook."""
+
+    notebook: Path
+    exercise: str
+    """Name of the grader."""
+    mark: str
+    """passed, not yet, not answered, or not reached."""
+    message: str
+
+
+def notebooks_in(paths: Sequence[Path]) -> list[Path]:
+    """Return the notebooks that files and folders stand for, in order.
+
+    Raises:
+        CommandError: there is no such file or folder, or no notebook in it.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = [p for p in path.rglob("*.ipynb") if ".ipynb_checkpoints" not in p.parts]
+            if not inside:
+                raise CommandError(f"{path} has no notebook in it: name the folder that the class handed in")
+            found += sorted(inside)
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise CommandError(f"there is no {path}: name a notebook, or a folder of notebooks")
+    return list(dict.fromkeys(found))
+
+
+def graders_called(notebook: Path) -> list[str]:
+    """Return the names of the graders that a notebook calls, in order.
+
+    Raises:
+        ValueError: the file is no notebook.
+    """
+    try:
+        cells = json.loads(notebook.read_text(encoding="utf8"))["cells"]
+        code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError("this file is no notebook: ask for it again") from error
+    return [name for source in code for name in _GRADER.findall(source)]
+
+
+def grade(notebook: Path, seconds: float, gigabytes: float) -> list[Grade]:
+    """Run a notebook in a process of its own and return what its graders say.
+
+    Args:
+        notebook: a student's.
+        seconds: after which the process is ended.
+        gigabytes: that it may allocate.
+
+    Returns:
+        One grade for each grader that the notebook calls, in order.
+    """
+    try:
+        wanted = graders_called(notebook)
+    except ValueError as error:
+        return [Grade(notebook, "–", "not reached", str(error))]
+    if not wanted:
+        return [
+            Grade(notebook, "–", "not reached", "this notebook calls no grader: is it one of the book's?")
+        ]
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "said"
+        report.touch()
+        reason = _run(notebook, report, seconds, gigabytes)
+        said = [
+            json.loads(line) for line in report.read_text(encoding="utf8").splitlines() if line.endswith("}")
+        ]
+    marks = {True: "passed", False: "not yet", None: "not answered"}
+    grades = [
+        Grade(notebook, name, marks[found["passed"]], found["message"])
+        for name, found in zip(wanted, said, strict=False)
+    ]
+    return grades + [Grade(notebook, name, "not reached", reason) for name in wanted[len(said) :]]
+
+
+def _run(notebook: Path, report: Path, seconds: float, gigabytes: float) -> str:
+    """Run the notebook, and say why what it did not reach was not reached."""
+    command = [sys.executable, "-m", "inbounds.cli.classroom.student", str(notebook.resolve()), str(report)]
+    process = subprocess.Popen(
+        [*command, str(gigabytes)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        return f"not reached within {seconds:g} s (--seconds)"
+    finally:
+        if process.poll() is None:
+            _end(process)
+    if process.returncode:
+        return f"not reached: the notebook's process ended with code {process.returncode} (out of memory? --gigabytes)"
+    return "not reached: the grader's cell raised an error, or shows something else"
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a process with all that it started."""
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+    process.wait()
+
+
+def run(paths: Sequence[Path], seconds: float, gigabytes: float, out: Path | None) -> int:
+    """Grade, print a table, and write it as CSV where that is asked for.
+
+    Returns:
+        0: grades are no failures of this command.
+
+    Raises:
+        CommandError: nothing to grade, or the CSV cannot be written.
+    """
+    if seconds <= 0 or gigabytes <= 0:
+        raise CommandError("--seconds and --gigabytes must be positive numbers", 2)
+    if out is not None and not out.parent.is_dir():
+        raise CommandError(f"there is no folder {out.parent} for the CSV: make it first")
+    notebooks = notebooks_in(paths)
+    grades: list[Grade] = []
+    progress = Console(stderr=True)
+    for notebook in track(
+        notebooks, "notebooks", console=progress, transient=True, disable=not progress.is_terminal
+    ):
+        grades += grade(notebook, seconds, gigabytes)
+    _print(grades)
+    if out is not None:
+        try:
+            _write(grades, out)
+        except OSError as error:
+            raise CommandError(f"{out} could not be written: {error.strerror or error}") from error
+        print(f"table: {out}")
+    return 0
+
+
+def _print(grades: Sequence[Grade]) -> None:
+    table = Table(pad_edge=False, box=None)
+    for heading in ("notebook", "exercise", "mark", "what the grader says"):
+        table.add_column(heading, overflow="fold")
+    before = None
+    for found in grades:
+        name = str(found.notebook) if found.notebook != before else ""
+        table.add_row(*map(escape, (name, found.exercise, found.mark, found.message)))
+        before = found.notebook
+    console = Console(highlight=False)
+    console.print(table)
+    passed = sum(found.mark == "passed" for found in grades)
+    count = len({found.notebook for found in grades})
+    console.print(f"{passed} of {len(grades)} exercises passed, in {count} notebook{'s' * (count > 1)}")
+
+
+def _write(grades: Sequence[Grade], path: Path) -> None:
+    with path.open("w", newline="", encoding="utf8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["notebook", "exercise", "mark", "message"])
+        rows.writerows([found.notebook, found.exercise, found.mark, found.message] for found in grades)

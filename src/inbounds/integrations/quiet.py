@@ -1,0 +1,51 @@
+"""A quiet start in other libraries: which scale makes an untrained policy execute so much noise, and no more.
+
+An untrained policy acts by its noise alone, and libraries start with σ = 1: a Gaussian that the environment clips then
+executes 0.72 of half the action range, a third of it on the bounds. The book's study starts every law with 0.4.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from scipy.optimize import brentq
+
+from inbounds.distributions import ClippedNormal, LogitNormal
+
+__all__ = ["quiet_scale"]
+
+_LOG_SCALES = -10.0, 3.0
+
+
+def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> float:
+    """Return the σ with which a law centred in its box executes a standard deviation of std.
+
+    Args:
+        law: `ClippedNormal`, a Gaussian whose actions the environment clips, or `LogitNormal`.
+        std: of the executed action, in units of half the action range.
+
+    Returns:
+        σ of the latent: of the logit-normal's z, or of the Gaussian in units of half the action range.
+
+    Raises:
+        ValueError: another law, or a std that no σ of it gives.
+
+    Example:
+        >>> round(quiet_scale(LogitNormal, 0.4), 3), round(quiet_scale(ClippedNormal, 0.4), 3)
+        (0.948, 0.411)
+    """
+    if law not in (ClippedNormal, LogitNormal):
+        raise ValueError(f"quiet_scale knows the laws ClippedNormal and LogitNormal, not {law}")
+
+    def executed(log_scale: float) -> float:
+        loc, scale = torch.tensor([0.0, math.exp(log_scale)], dtype=torch.float64)
+        return law(loc, scale, -1.0, 1.0).variance.sqrt().item()
+
+    least, most = map(executed, _LOG_SCALES)
+    if not least < std < most:
+        raise ValueError(
+            f"std={std} is out of reach: centred in its box, a {law.__name__} executes between {least:.2g} and "
+            f"{most:.2g} of half the action range"
+        )
+    return math.exp(brentq(lambda s: executed(s) - std, *_LOG_SCALES, xtol=1e-12))

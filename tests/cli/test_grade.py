@@ -1,0 +1,95 @@
+"""`inbounds grade`: what graders say of students' notebooks, each run in a process of its own, within its limits."""
+
+import csv
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from inbounds.cli.classroom import grading
+from tests.cli.small import run, succeeds
+
+IMPORTS = "import time\nfrom inbounds.book.exercises import storing_actions as graders"
+RIGHT = "import math\ndef bits_for(z):\n    return math.ceil(math.log2(1 + math.exp(z)) - 2)"
+WRONG = "import math\ndef bits_for(z):\n    return math.ceil(math.log2(1 + math.exp(z)))"
+CALL = "graders.bits_for(bits_for)"
+
+
+def notebook(path: Path, *cells: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    made = [nbformat.v4.new_markdown_cell("# Mine"), *map(nbformat.v4.new_code_cell, cells)]
+    nbformat.write(nbformat.v4.new_notebook(cells=made), path)
+    return path
+
+
+def graded(path: Path, seconds: float = 60, gigabytes: float = 6) -> list[tuple[str, str, str]]:
+    return [(g.exercise, g.mark, g.message) for g in grading.grade(path, seconds, gigabytes)]
+
+
+@pytest.mark.slow
+def test_a_class_is_graded(tmp_path: Path) -> None:
+    notebook(tmp_path / "ada" / "08.ipynb", IMPORTS, RIGHT, CALL)
+    notebook(tmp_path / "ben" / "08.ipynb", IMPORTS, "raise OSError('a cell that fails')", WRONG, CALL)
+    notebook(tmp_path / "cy" / "08.ipynb", IMPORTS, "def bits_for(z):\n    return ...", CALL)
+    table = tmp_path / "grades.csv"
+    out = succeeds(["grade", str(tmp_path), "--out", str(table)])
+    with table.open(encoding="utf8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(Path(row["notebook"]).parent.name, row["exercise"], row["mark"]) for row in rows] == [
+        ("ada", "bits_for", "passed"),
+        ("ben", "bits_for", "not yet"),
+        ("cy", "bits_for", "not answered"),
+    ]
+    assert rows[1]["message"].startswith("two bits too many")
+    assert "1 of 3 exercises passed, in 3 notebooks" in out
+
+
+@pytest.mark.slow
+def test_what_was_said_before_the_time_was_over_stays(tmp_path: Path) -> None:
+    path = notebook(tmp_path / "slow.ipynb", IMPORTS, RIGHT, CALL, "time.sleep(600)", CALL)
+    (_, first, _), (_, second, why) = graded(path, seconds=20)
+    assert (first, second) == ("passed", "not reached")
+    assert why == "not reached within 20 s (--seconds)"
+
+
+@pytest.mark.slow
+def test_memory_and_exits_are_a_students_own(tmp_path: Path) -> None:
+    greedy = notebook(tmp_path / "greedy.ipynb", IMPORTS, RIGHT, "x = bytearray(8_000_000_000)", CALL)
+    assert graded(greedy, gigabytes=4)[0][1] == "passed"  # the cell raised MemoryError, the others ran
+    gone = notebook(tmp_path / "gone.ipynb", IMPORTS, RIGHT, "import os; os._exit(3)", CALL)
+    ((_, mark, why),) = graded(gone)
+    assert mark == "not reached"
+    assert "ended with code 3" in why
+
+
+@pytest.mark.slow
+def test_a_grader_that_is_not_shown_is_not_reached(tmp_path: Path) -> None:
+    path = notebook(tmp_path / "a.ipynb", IMPORTS, "graders.bits_for(undefined)")
+    assert [row[1] for row in graded(path)] == ["not reached"]
+
+
+def test_files_that_are_no_such_notebook(tmp_path: Path) -> None:
+    text = tmp_path / "a.ipynb"
+    text.write_text("{", encoding="utf8")
+    assert graded(text) == [("–", "not reached", "this file is no notebook: ask for it again")]
+    other = notebook(tmp_path / "b.ipynb", "1 + 1")
+    assert "calls no grader" in graded(other)[0][2]
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["nowhere"], "there is no nowhere: name a notebook, or a folder of notebooks"),
+        ([".", "--seconds", "0"], "--seconds and --gigabytes must be positive numbers"),
+        ([".", "--out", "no/folder/a.csv"], "there is no folder no/folder for the CSV"),
+        (["."], "has no notebook in it"),
+    ],
+)
+def test_what_cannot_be_graded_is_said(
+    args, message, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("grade", *args)
+    assert code in (1, 2)
+    assert out == ""
+    assert message in err

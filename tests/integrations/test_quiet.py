@@ -1,0 +1,84 @@
+"""A quiet start: the untrained policy executes the standard deviation asked for, in every library."""
+
+import numpy as np
+import pytest
+import torch
+from sb3_contrib import TRPO
+from scipy import integrate, stats
+from stable_baselines3 import A2C, PPO, SAC
+from tensordict import TensorDict
+from torch import nn
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+from torchrl.modules import NormalParamExtractor
+
+from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
+from inbounds.integrations.quiet import quiet_scale
+from inbounds.integrations.stable_baselines3 import LogitNormalPolicy, quiet_start
+from inbounds.integrations.torchrl import bounded_actor
+from inbounds.learning import executed_std
+from tests.integrations.tank import HIGH, LOW, Tank
+
+HALF, MIDDLE = (HIGH - LOW) / 2, (HIGH + LOW) / 2
+
+
+def square_mean(unit, scale: float) -> float:
+    """E[u(z)²], z ~ N(0, σ²), by quadrature; the clip's kinks are told to it."""
+    kinks = {"points": (-1, 1)} if unit is clipped else {}
+    reach = 9 * scale
+    return integrate.quad(
+        lambda z: unit(z) ** 2 * stats.norm.pdf(z, 0, scale), -reach, reach, limit=200, **kinks
+    )[0]
+
+
+def clipped(z: float) -> float:
+    return float(np.clip(z, -1, 1))
+
+
+@pytest.mark.parametrize("std", [0.1, 0.4, 0.55])
+@pytest.mark.parametrize(("law", "unit"), [(LogitNormal, lambda z: np.tanh(z / 2)), (ClippedNormal, clipped)])
+def test_the_scale_gives_the_noise(law, unit, std) -> None:
+    assert square_mean(unit, quiet_scale(law, std)) ** 0.5 == pytest.approx(std, abs=1e-6)
+
+
+def test_it_is_the_packages_own_inverse() -> None:
+    for law, family in ((LogitNormal, "logit-normal"), (ClippedNormal, "gaussian")):
+        assert executed_std(family, quiet_scale(law, 0.3)) == pytest.approx(0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("algorithm", [PPO, A2C, TRPO])
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+def test_models_of_the_peer_start_so_in_a_lopsided_box(algorithm, policy) -> None:
+    model = quiet_start(algorithm(policy, Tank(), n_steps=128, device="cpu", seed=1), 0.4)
+    actions, _ = model.predict(np.zeros((40_000, 2), np.float32), deterministic=False)
+    spread = np.sqrt((((actions - MIDDLE) / HALF) ** 2).mean(0))
+    assert spread == pytest.approx([0.4, 0.4], abs=0.01)  # five standard errors
+    with torch.no_grad():
+        before = model.policy.log_std.clone()
+    model.learn(256)
+    assert not torch.equal(before, model.policy.log_std)  # still learned
+
+
+def test_what_has_no_such_start_is_refused() -> None:
+    with pytest.raises(ValueError, match="this policy has SACPolicy"):
+        quiet_start(SAC("MlpPolicy", Tank(), device="cpu"))  # type: ignore[type-var]
+    with pytest.raises(ValueError, match="StateDependentNoiseDistribution"):
+        quiet_start(PPO("MlpPolicy", Tank(), use_sde=True, device="cpu"))
+    with pytest.raises(ValueError, match="CategoricalDistribution"):
+        quiet_start(PPO("MlpPolicy", "CartPole-v1", device="cpu"))
+    with pytest.raises(ValueError, match=r"std=1.5 is out of reach: .* between .* and"):
+        quiet_scale(ClippedNormal, 1.5)
+    with pytest.raises(ValueError, match=r"not <class 'inbounds\.distributions\.scaled_beta\.ScaledBeta'>"):
+        quiet_scale(ScaledBeta)  # type: ignore[arg-type]
+
+
+def test_torchrls_extractor_starts_with_it() -> None:
+    sigma = quiet_scale(LogitNormal, 0.4)
+    last = nn.Linear(2, 4)
+    nn.init.zeros_(last.weight), nn.init.zeros_(last.bias)
+    network = nn.Sequential(last, NormalParamExtractor(scale_mapping=f"biased_softplus_{sigma}"))
+    _, acting = bounded_actor(network, LogitNormal, LOW, HIGH)
+    torch.manual_seed(0)
+    with set_exploration_type(ExplorationType.RANDOM), torch.no_grad():
+        action = acting(TensorDict(observation=torch.zeros(40_000, 2), batch_size=[40_000]))["action"]
+    spread = np.sqrt((((action.numpy() - MIDDLE) / HALF) ** 2).mean(0))
+    assert spread == pytest.approx([0.4, 0.4], abs=0.01)
