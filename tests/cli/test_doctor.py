@@ -63,6 +63,13 @@ def test_what_only_some_need_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> N
     assert '– packages (fast): missing or of another version: numba pip install ".[fast]"' in out
 
 
+def test_an_extra_that_the_installation_does_not_know(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metadata, "requires", lambda _: ["numpy>=2"])
+    code, out = only(monkeypatch, lambda: doctor.look_at_packages("fast"))
+    assert code == 0
+    assert "– packages (fast): unknown to this installation" in out
+
+
 @pytest.mark.parametrize(
     ("version", "mark"), [((3, 10), "✗"), ((3, 11), "✓"), ((3, 13), "✓"), ((3, 14), "–")]
 )
