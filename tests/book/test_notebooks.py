@@ -18,6 +18,9 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 REFERENCE_PAGES = {
     # What the book found, for who has two minutes. Its numbers are glued, and its claims asserted where they are made.
     "front_page",
+    # Six answers with their evidence, for who only wants to know what to use. Its words follow from the cells by rules
+    # that tests/book/report/test_equal_start.py holds; its code is run by tests/book/test_which_policy.py.
+    "which_policy",
     # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
     # every entry must have its own check (`test_every_erratum_is_checked`).
     "errata",

@@ -1,0 +1,180 @@
+"""What *Which policy?* answers: forests of the evidence, and the words that follow from it by rule.
+
+rows = laws(outcomes_of_both(study_pages.shipped()))
+first_choice(of(rows, algorithm="ppo"))
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from inbounds.book.report import html
+from inbounds.book.report.equal_start import LAWS, Evidence, grade
+from inbounds.book.report.forests import SERIES, Bar, forest, in_words
+from inbounds.book.report.html import Shown
+from inbounds.study.grid import ROBOTS
+from inbounds.study.second.yardsticks import ENDPOINTS
+from inbounds.study.words import spoken
+
+XLABEL = "difference, in fifths of what training adds on the robot"
+"""Of every forest: the second protocol's margin is its unit."""
+
+
+def of(rows: Sequence[Evidence], **which: str) -> list[Evidence]:
+    """Return the rows with certain values.
+
+    Args:
+        rows: of `equal_start.laws` or `quiet_starts`.
+        **which: name of a field and its value, such as `algorithm="ppo"`.
+
+    Example:
+        >>> of([], algorithm="ppo")
+        []
+    """
+    return [row for row in rows if all(getattr(row, name) == value for name, value in which.items())]
+
+
+def sign(row: Evidence) -> int:
+    """Return 1 where the difference is above 0, however well that is founded, −1 below, 0 where neither is shown."""
+    if grade(row) in ("too small to matter, with fresh seeds", "no difference found"):
+        return 0
+    return 1 if row.difference.value > 0 else -1
+
+
+def first_choice(rows: Sequence[Evidence]) -> str:
+    """Return the law to begin with, by a rule that knows no law's name; empty where none leads.
+
+    A law leads that lies above the equally quiet Gaussian somewhere, by either endpoint, and below it nowhere. Of two,
+    the one that does so on more robots and endpoints; of two alike, neither.
+
+    Args:
+        rows: of one algorithm, both endpoints.
+
+    Example:
+        >>> import numpy as np
+        >>> from inbounds.study.statistics import Estimate
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
+        >>> first_choice([Evidence("Ant", "ppo", "beta", "final", ahead, study=1)])
+        'beta'
+    """
+    signs = {law: [sign(row) for row in of(rows, law=law)] for law in LAWS}
+    lead = {law: found.count(1) for law, found in signs.items() if 1 in found and -1 not in found}
+    best = [law for law, count in lead.items() if count == max(lead.values())]
+    return best[0] if len(best) == 1 else ""
+
+
+def advice(algorithm: str, law: str) -> str:
+    """Return the recommendation that follows from a first choice.
+
+    Example:
+        >>> advice("trpo", "")
+        'Under TRPO, take the law that your library has.'
+    """
+    names = {"": "law that your library has", "beta": "Beta", "logit-normal": "logit-normal"}
+    return f"Under {algorithm.upper()}, take the {names[law]}."
+
+
+def counted(rows: Sequence[Evidence]) -> str:
+    """Return on how many robots the differences lie where, in the book's words; says so where there are none.
+
+    Example:
+        >>> counted([])
+        'not run yet'
+    """
+    if not rows:
+        return "not run yet"
+    counts = Counter(map(sign, rows))
+    robots = f"{len(rows)} robot{'' if len(rows) == 1 else 's'}"
+    return f"above on {counts[1]} of {robots}, below on {counts[-1]}, no difference found on {counts[0]}"
+
+
+def graded(rows: Sequence[Evidence]) -> str:
+    """Return how well the differences are founded that leave out 0; the best grade first.
+
+    Example:
+        >>> graded([])
+        'no difference found'
+    """
+    order = ("found with fresh seeds", "found", "suggested", "too small to matter, with fresh seeds")
+    counts = Counter[str](map(grade, rows))
+    known = [f"{word} on {counts[word]}" for word in order if counts[word]]
+    return "; ".join(known) or "no difference found"
+
+
+def leading(rows: Sequence[Evidence]) -> str:
+    """Return the differences that leave out 0, with their intervals and grades, robot by robot; or that there is none.
+
+    Example:
+        >>> leading([])
+        'nowhere'
+    """
+    told = [f"{row.robot} {spoken(row.difference)} ({grade(row)})" for row in rows if sign(row)]
+    return "; ".join(told) or "nowhere"
+
+
+def bars(rows: Sequence[Evidence]) -> list[Bar]:
+    """Return the rows as bars of a forest; hollow where the first study's cells stand in for the second's."""
+    return [Bar(row.robot, row.law, row.difference, row.margin, hollow=row.study == 1) for row in rows]
+
+
+def by_algorithm(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
+    """Return a forest with a panel an algorithm: each law against a Gaussian that starts equally quiet."""
+    return _forest(
+        f"each law against an equally quiet start, {ENDPOINTS[endpoint]}",
+        {a.upper(): of(rows, algorithm=a, endpoint=endpoint) for a in ("ppo", "trpo")},
+    )
+
+
+def by_endpoint(rows: Sequence[Evidence], algorithm: str) -> Shown:
+    """Return a forest with a panel an endpoint, of one algorithm."""
+    return _forest(
+        f"from an equal start, {algorithm.upper()}",
+        {name: of(rows, algorithm=algorithm, endpoint=e) for e, name in ENDPOINTS.items()},
+    )
+
+
+def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
+    drawn = {title: bars(rows) for title, rows in panels.items() if rows}
+    if not drawn:
+        return html.of_study(what, html.NONE_FINISHED)
+    alt = f"Differences with 95 percent intervals, a group of rows per robot. {in_words(drawn)}"
+    fig = forest(drawn, xlabel=XLABEL, order=ROBOTS)
+    return html.of_study(what, html.figure(fig, alt, _caption(panels)), *_waiting(panels))
+
+
+def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
+    rows = [row for found in panels.values() for row in found]
+    studies = {row.study for row in rows}
+    said = [
+        "Bars: 95 % bootstrap intervals of a difference of means. Grey: a difference too small to choose by, a fifth "
+        "of what training adds on the robot."
+    ]
+    if studies == {1, 2}:
+        said.append(
+            "Filled: fresh seeds, the second study, whose Gaussian has one free σ per action. Hollow: the first study, "
+            "whose Gaussian has a σ that depends on the state."
+        )
+    else:
+        said.append(
+            "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
+        )
+    if lent := sorted({f"{row.robot} ({row.algorithm.upper()})" for row in rows if row.as_it_comes}):
+        said.append(f"The bounded law starts as it comes, nearly as quiet: {', '.join(lent)}.")
+    return " ".join(said)
+
+
+def _waiting(panels: Mapping[str, Sequence[Evidence]]) -> list[str]:
+    """Return one strip that names what was not run."""
+    lacking = {
+        title: [
+            f"{robot} ({', '.join(SERIES[law].label.split(' − ')[0] for law in laws)})"
+            if len(laws) < len(LAWS)
+            else robot
+            for robot in ROBOTS
+            if (laws := [law for law in LAWS if not of(rows, robot=robot, law=law)])
+        ]
+        for title, rows in panels.items()
+    }
+    told = [f"{title}: {', '.join(robots)}" for title, robots in lacking.items() if robots]
+    return [html.missing(f"Not run from an equal start. {'; '.join(told)}.")] if told else []

@@ -1,0 +1,256 @@
+"""What starting quietly is worth, and what a law is worth from an equally quiet start: the evidence, and its grade.
+
+Two studies have such numbers. The second (`results/PROTOCOL-2.md`) asked for them before its first run, with fresh
+seeds and a test; the first has cells with executed noise 0.4, which no test of its protocol covers, and some of which
+were asked for afterwards. On each robot the second study's number is taken as soon as both of its sides have a
+finished cell, the first's until then.
+
+    rows = laws(outcomes_of_both(study_pages.shipped()))
+    [grade(row) for row in rows]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from inbounds.study import statistics
+from inbounds.study.analysis import generator_for, marked, scores
+from inbounds.study.grid import AFTERWARDS, FREE, ROBOTS, second_cells
+from inbounds.study.outcomes import Column, Outcome, Outcomes
+from inbounds.study.second import GAUSSIAN, MARGINS, primary
+from inbounds.study.second.pooled import is_whole
+from inbounds.study.second.primary import BOUNDED, RESAMPLES, finding, gap
+from inbounds.study.second.yardsticks import ENDPOINTS
+from inbounds.study.statistics import Estimate
+from inbounds.study.statistics.settings import SIGNIFICANCE
+from inbounds.study.words import side
+
+Grade: TypeAlias = Literal[
+    "found with fresh seeds",
+    "too small to matter, with fresh seeds",
+    "found",
+    "suggested",
+    "no difference found",
+]
+LAWS = ("beta", "logit-normal")
+"""The bounded ones, in the order of the pages."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A difference between two columns on a robot, and what stands behind it.
+
+    Example:
+        >>> import numpy as np
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
+        >>> grade(Evidence("Ant", "ppo", "beta", "final", ahead, study=1))
+        'suggested'
+    """
+
+    robot: str
+    """Where."""
+    algorithm: str
+    """ppo or trpo."""
+    law: str
+    """The first side's family; gaussian for a quiet start minus the start as it comes."""
+    endpoint: str
+    """final or area."""
+    difference: Estimate
+    """First minus second, 100 000 resamples."""
+    study: Literal[1, 2]
+    """Which study's cells."""
+    p_adjusted: float = float("nan")
+    """Of the protocol's test after its correction; NaN where the protocol has none, or seeds are missing."""
+    whole: bool = True
+    """Whether all planned seeds of both sides are there."""
+    primary: bool = False
+    """Whether the second protocol's rule for its primary comparison decides."""
+    as_it_comes: bool = False
+    """Whether the law's own start was left as it is, nearly as quiet as the Gaussian's."""
+
+    @property
+    def margin(self) -> float:
+        """Below which a difference does not matter, by the second protocol."""
+        return MARGINS[self.endpoint][self.robot]
+
+
+def grade(evidence: Evidence) -> Grade:
+    """Return how well a difference is founded: the only place that decides it.
+
+    Returns:
+        * *found with fresh seeds*: all planned seeds of the second study are there, and its corrected test finds it;
+        * *too small to matter, with fresh seeds*: by the second protocol's rule, the interval lies within the margin;
+        * *found*: the same test of the first study's protocol finds it;
+        * *suggested*: the interval leaves out 0, but no corrected test finds it, or seeds are still to be run;
+        * *no difference found*: the interval holds 0.
+
+    Example:
+        >>> import dataclasses
+        >>> import numpy as np
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(999.0), 10, 0, 0.95, "difference of means")
+        >>> first = Evidence("Ant", "ppo", "beta", "final", ahead, study=1, p_adjusted=0.01)
+        >>> grade(first), grade(dataclasses.replace(first, study=2)), grade(dataclasses.replace(first, whole=False))
+        ('found', 'found with fresh seeds', 'suggested')
+    """
+    gap, apart = evidence.difference, clear(evidence.difference)
+    tested = evidence.whole and evidence.p_adjusted < SIGNIFICANCE  # NaN is not below
+    if evidence.primary and evidence.whole:
+        told = finding(gap, evidence.p_adjusted, evidence.margin)
+        if told == "refuted":
+            return "too small to matter, with fresh seeds"
+        if told in ("confirmed", "contradicted"):
+            return "found with fresh seeds"
+        tested = False
+    if not apart:
+        return "no difference found"
+    if not tested:
+        return "suggested"
+    return "found with fresh seeds" if evidence.study == 2 else "found"
+
+
+def clear(estimate: Estimate) -> int:
+    """Return on which side of 0 an interval lies, 0 where it holds 0 or ends within a hundredth of its width of it.
+
+    So far the luck of the resampling may move an end.
+
+    Example:
+        >>> import numpy as np
+        >>> ends = [(0.02, 56.4), (2.0, 58.0), (-9.0, -1.0)]
+        >>> [clear(Estimate(np.array(0.0), *map(np.array, each), 10, 0, 0.95, "difference of means")) for each in ends]
+        [0, 1, -1]
+    """
+    slack = (estimate.high - estimate.low) / 100
+    return side(estimate.low - slack, estimate.high + slack)
+
+
+def outcomes_of_both(first: Outcomes) -> Outcomes:
+    """Return the outcomes of the first study with what was asked afterwards and with the second study's."""
+    return first.and_of(AFTERWARDS).and_of(second_cells())
+
+
+def laws(outcomes: Outcomes) -> list[Evidence]:
+    """Return each bounded law minus a Gaussian that starts equally quiet, wherever there are cells for it.
+
+    Args:
+        outcomes: of both studies, as `outcomes_of_both` returns them.
+
+    Returns:
+        By algorithm, endpoint, robot and law. Under PPO the second study's Gaussian has a free σ, the first's one of
+        the state; under TRPO likewise.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> laws(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))))
+        []
+    """
+    fresh = {
+        (e.algorithm, e.endpoint, e.robot, e.law): e for e in (*_primary(outcomes), *_under_trpo(outcomes))
+    }
+    rows = []
+    for algorithm in ("ppo", "trpo"):
+        for endpoint in ENDPOINTS:
+            for robot in ROBOTS:
+                for law in LAWS:
+                    found = fresh.get((algorithm, endpoint, robot, law))
+                    rows.append(found or _of_first_study(outcomes, algorithm, law, robot, endpoint))
+    return [row for row in rows if row is not None]
+
+
+def quiet_starts(outcomes: Outcomes) -> list[Evidence]:
+    """Return a Gaussian that starts with executed noise 0.4 minus the same with σ = 1, wherever there are cells.
+
+    Args:
+        outcomes: of both studies, as `outcomes_of_both` returns them.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> quiet_starts(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))))
+        []
+    """
+    quiet, plain = GAUSSIAN, Column("as-they-come", "ppo", "gaussian", FREE)
+    rows: list[Evidence | None] = []
+    for algorithm in ("ppo", "trpo"):
+        for endpoint in ENDPOINTS:
+            found = _tested(outcomes, quiet, plain, endpoint) if algorithm == "ppo" else {}
+            for robot in ROBOTS:
+                pair = (
+                    _quiet(outcomes, algorithm, "gaussian", robot),
+                    _plain(outcomes, algorithm, "gaussian", robot),
+                )
+                first = _minus(*pair, endpoint)
+                rows.append(found.get(robot) or first)
+    return [row for row in rows if row is not None]
+
+
+def _primary(outcomes: Outcomes) -> Iterable[Evidence]:
+    for row in primary(outcomes):
+        if row.difference is not None:
+            p = row.p_adjusted if row.whole else float("nan")
+            yield Evidence(
+                row.robot, "ppo", row.law, row.endpoint, row.difference, 2, p, row.whole, primary=True
+            )
+
+
+def _under_trpo(outcomes: Outcomes) -> Iterable[Evidence]:
+    gaussian = Column("equal", "trpo", "gaussian", FREE)
+    for law in BOUNDED:
+        for endpoint in ENDPOINTS:
+            yield from _tested(outcomes, Column("equal", "trpo", law), gaussian, endpoint).values()
+
+
+def _tested(outcomes: Outcomes, first: Column, second: Column, endpoint: str) -> dict[str, Evidence]:
+    """Return a secondary comparison of the second study by robot, corrected over its robots as the protocol has it."""
+    gaps = {robot: gap(outcomes, first, second, robot, endpoint) for robot in ROBOTS}
+    whole = {robot: all(is_whole(outcomes, column, robot) for column in (first, second)) for robot in ROBOTS}
+    # A test of which seeds are still to be run keeps its place in the correction, as one that was not run.
+    p_values = [each.p_value if whole[robot] else float("nan") for robot, each in gaps.items()]
+    return {
+        robot: Evidence(
+            robot, first.algorithm, first.family, endpoint, each.difference, 2, float(p), whole[robot]
+        )
+        for (robot, each), p in zip(gaps.items(), statistics.holm(p_values), strict=True)
+        if each.difference is not None
+    }
+
+
+def _of_first_study(
+    outcomes: Outcomes, algorithm: str, law: str, robot: str, endpoint: str
+) -> Evidence | None:
+    quiet = _quiet(outcomes, algorithm, law, robot)
+    found = quiet or _plain(outcomes, algorithm, law, robot)
+    return _minus(found, _quiet(outcomes, algorithm, "gaussian", robot), endpoint, as_it_comes=quiet is None)
+
+
+def _minus(
+    first: Outcome | None, second: Outcome | None, endpoint: str, *, as_it_comes: bool = False
+) -> Evidence | None:
+    """Return the difference of two cells of the first study; its protocol tests none of those here."""
+    if first is None or second is None:
+        return None
+    cell = first.cell
+    difference = statistics.difference(
+        scores(first, endpoint),
+        scores(second, endpoint),
+        generator_for("equal start", cell.id, second.cell.id, endpoint),
+        statistic="mean",
+        resamples=RESAMPLES,
+        missing="exclude",
+    )
+    told = marked(difference, first, second)
+    return Evidence(cell.robot, cell.algorithm, cell.family, endpoint, told, 1, as_it_comes=as_it_comes)
+
+
+def _quiet(outcomes: Outcomes, algorithm: str, family: str, robot: str) -> Outcome | None:
+    """Return the first study's cell with executed noise 0.4, planned or asked for afterwards."""
+    arms = (Column(arm, algorithm, family, "matched-noise") for arm in ("mechanisms", "afterwards"))
+    return next((o for column in arms if (o := outcomes.find(column, robot)) is not None), None)
+
+
+def _plain(outcomes: Outcomes, algorithm: str, family: str, robot: str) -> Outcome | None:
+    """Return the first study's cell as the family comes."""
+    arms = (Column(arm, algorithm, family) for arm in ("standard", "beyond"))
+    return next((o for column in arms if (o := outcomes.find(column, robot)) is not None), None)

@@ -1,0 +1,147 @@
+"""The grade of a finding is decided in one place, and changes when cells arrive."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from inbounds.book.report import answers
+from inbounds.book.report.equal_start import Evidence, grade, laws, outcomes_of_both, quiet_starts
+from inbounds.study.grid import AFTERWARDS, SECOND, select
+from inbounds.study.outcomes import Outcomes
+from inbounds.study.statistics import Estimate
+from inbounds.study.store import StudyFolder
+from tests.study.small import folder_in
+from tests.study.synthetic import write_cells
+
+
+def gap(low: float, high: float) -> Estimate:
+    return Estimate(
+        np.array((low + high) / 2), np.array(low), np.array(high), 10, 0, 0.95, "difference of means"
+    )
+
+
+CLEAR = Evidence("Ant", "ppo", "beta", "final", gap(300, 900), study=1)
+SECOND_ONE = dataclasses.replace(CLEAR, study=2, p_adjusted=0.01, primary=True)
+
+
+@pytest.mark.parametrize(
+    ("changed", "word"),
+    [
+        ({}, "suggested"),
+        ({"p_adjusted": 0.01}, "found"),
+        ({"p_adjusted": 0.2}, "suggested"),
+        ({"difference": gap(-1, 900)}, "no difference found"),
+        ({"difference": gap(-1, 900), "p_adjusted": 0.01}, "no difference found"),
+        ({"difference": gap(1, 900)}, "no difference found"),  # the resampling's luck reaches as far as 0
+    ],
+)
+def test_grades_of_the_first_study(changed: dict, word: str) -> None:
+    assert grade(dataclasses.replace(CLEAR, **changed)) == word
+
+
+@pytest.mark.parametrize(
+    ("changed", "word"),
+    [
+        ({}, "found with fresh seeds"),
+        ({"whole": False}, "suggested"),
+        ({"p_adjusted": 0.2}, "suggested"),
+        ({"difference": gap(-900, -300)}, "found with fresh seeds"),
+        ({"difference": gap(10, 90)}, "too small to matter, with fresh seeds"),
+        ({"difference": gap(-90, 90)}, "too small to matter, with fresh seeds"),
+        ({"difference": gap(-90, 90), "whole": False}, "no difference found"),
+        ({"difference": gap(10, 90), "primary": False}, "found with fresh seeds"),
+        ({"difference": gap(-90, 900)}, "found with fresh seeds"),  # the protocol's test decides
+        ({"difference": gap(-90, 900), "p_adjusted": 0.2}, "no difference found"),
+    ],
+)
+def test_grades_of_the_second_study(changed: dict, word: str) -> None:
+    assert grade(dataclasses.replace(SECOND_ONE, **changed)) == word
+
+
+@pytest.fixture
+def folder(tmp_path) -> StudyFolder:
+    """Of the first study: quiet and plain Gaussian, Beta as it comes, on Ant under PPO."""
+    found = folder_in(tmp_path)
+    quiet = [cell for cell in AFTERWARDS if cell.id == "afterwards-ant-ppo-gaussian-matched-noise"]
+    write_cells(found, [*select(["standard-ant-ppo-gaussian", "standard-ant-ppo-beta"]), *quiet])
+    return found
+
+
+def of_the_beta(folder: StudyFolder) -> Evidence:
+    (found,) = answers.of(
+        laws(outcomes_of_both(Outcomes.read(folder))), law="beta", endpoint="final", robot="Ant"
+    )
+    return found
+
+
+def test_the_grade_changes_as_cells_arrive(folder: StudyFolder) -> None:
+    found = of_the_beta(folder)
+    assert (found.study, found.as_it_comes, grade(found)) == (1, True, "suggested")
+    names = ("equal-ant-ppo-gaussian-free-std", "equal-ant-ppo-beta")
+    first, *rest = [cell for cell in SECOND["B"] if cell.id in names]
+    write_cells(folder, [first])
+    assert of_the_beta(folder) == found  # one side alone says nothing
+    write_cells(folder, rest)
+    half = of_the_beta(folder)
+    assert (half.study, half.whole, half.difference.n, grade(half)) == (2, False, 10, "suggested")
+    more = ("equal-more-ant-ppo-gaussian-free-std", "equal-more-ant-ppo-beta")
+    write_cells(folder, [cell for cell in SECOND["B, more seeds"] if cell.id in more])
+    whole = of_the_beta(folder)
+    assert (whole.whole, whole.difference.n, grade(whole)) == (True, 20, "found with fresh seeds")
+
+
+def test_a_quiet_start_waits_for_the_second_study(folder: StudyFolder) -> None:
+    def found() -> Evidence:
+        (row,) = answers.of(
+            quiet_starts(outcomes_of_both(Outcomes.read(folder))), robot="Ant", endpoint="final"
+        )
+        return row
+
+    assert (found().study, found().algorithm) == (1, "ppo")
+    names = ("equal-ant-ppo-gaussian-free-std", "as-they-come-ant-ppo-gaussian-free-std")
+    cells = [cell for block in ("B", "D") for cell in SECOND[block] if cell.id in names]
+    write_cells(folder, cells)
+    assert (found().study, found().whole) == (2, False)  # ten more seeds of the quiet one are planned
+
+
+def row(law: str, low: float, high: float, robot: str = "Ant") -> Evidence:
+    return Evidence(robot, "ppo", law, "final", gap(low, high), study=1)
+
+
+@pytest.mark.parametrize(
+    ("rows", "law"),
+    [
+        ([], ""),
+        ([row("beta", 100, 900)], "beta"),
+        ([row("beta", 100, 900), row("beta", -900, -100, "Hopper")], ""),
+        ([row("beta", 100, 900), row("logit-normal", 100, 900)], ""),
+        (
+            [row("beta", 100, 900), row("logit-normal", 100, 900), row("logit-normal", 100, 900, "Hopper")],
+            "logit-normal",
+        ),
+        ([row("beta", 100, 900), row("logit-normal", -900, -100)], "beta"),
+        ([row("beta", -100, 900)], ""),
+    ],
+)
+def test_the_first_choice_follows_from_the_numbers(rows: list[Evidence], law: str) -> None:
+    assert answers.first_choice(rows) == law
+
+
+def test_what_is_too_small_to_matter_leads_nowhere() -> None:
+    small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
+    assert answers.first_choice([small]) == ""
+    assert answers.first_choice([SECOND_ONE]) == "beta"
+
+
+def test_the_forest_says_what_is_there_and_what_is_not(folder: StudyFolder) -> None:
+    rows = laws(outcomes_of_both(Outcomes.read(folder)))
+    shown = answers.by_algorithm(rows).html
+    assert "Beta − Gaussian" in shown
+    assert "The bounded law starts as it comes, nearly as quiet: Ant (PPO)." in shown
+    assert "Not run from an equal start." in shown
+    assert "Ant (Logit-normal)" in shown
+    assert "missing" in answers.by_algorithm([]).html
+    assert repr(answers.by_algorithm(rows)) == repr(
+        answers.by_algorithm([])
+    )  # a stored notebook stays as it is

@@ -1,0 +1,60 @@
+"""The code of *Which policy?* runs pasted as it is, and starts as quietly as the page says."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.book.anatomy import prose_of
+
+PAGE = prose_of(Path(__file__).resolve().parents[2] / "notebooks" / "which_policy.ipynb")
+PROGRAMS = dict(re.findall(r"\{tab-item\} (\S+)\n~~~python\n(.*?)^~~~$", PAGE, re.M | re.S))
+SHORTER = {"EPOCHS = 500": "EPOCHS = 1", "STEPS, ROBOT = 1_000_000": "STEPS, ROBOT = 64"}
+QUIET = """
+def executed(actions):
+    spread = float(np.clip(actions, -1, 1).std())
+    assert abs(spread - 0.4) < 0.03, spread
+import numpy as np
+"""
+MEASURED = {
+    "inbounds": """
+from inbounds.learning import Trainer
+rollout = Trainer(replace(config, policy=quiet, seeds=(0, 1))).collector.collect(200)
+executed(rollout.action.numpy())
+assert action.shape == (6,) and len(run.policies) == 10
+""",
+    "stable-baselines3": """
+import torch
+obs = torch.zeros(3000, 17)
+for policy in ("MlpPolicy", LogitNormalPolicy):
+    fresh = quiet_start(PPO(policy, ROBOT, device="cpu")).policy
+    with torch.no_grad():
+        drawn = fresh(obs)[0].numpy()
+    executed(fresh.unscale_action(drawn) if policy is LogitNormalPolicy else drawn)
+assert min(gaussian.num_timesteps, logit_normal.num_timesteps) >= STEPS
+""",
+    "TorchRL": """
+executed(batch["action"].detach().numpy())
+assert "latent" in batch.keys()
+assert loss.actor_network is not None
+""",
+}
+
+
+def test_each_library_has_a_program() -> None:
+    assert set(PROGRAMS) == set(MEASURED)
+    assert all(any(old in program for program in PROGRAMS.values()) for old in SHORTER)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("library", MEASURED)
+def test_the_program_runs_and_starts_quietly(library: str) -> None:
+    """In a process of its own; shortened in the one number that says how long it trains."""
+    program = PROGRAMS[library]
+    for old, new in SHORTER.items():
+        program = program.replace(old, new)
+    text = f"import warnings\nwarnings.simplefilter('ignore')\n{program}\n{QUIET}\n{MEASURED[library]}"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
