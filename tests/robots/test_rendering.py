@@ -71,6 +71,21 @@ def test_the_frame_shows_the_present_state_and_is_a_new_array():
     np.testing.assert_array_equal(first, kept)
 
 
+def test_a_model_without_a_sky_gets_a_light_one():
+    with RobotRenderer(made("InvertedPendulum")) as renderer:
+        frame = renderer.frame()
+    sky = frame[0, 0]
+    assert (sky > 200).all()
+    share = (frame == sky).all(axis=2).mean()
+    assert 0.5 < share < 0.99  # the cart, the pole and the rail are seen before it
+    assert not (frame == 0).all(axis=2).any()
+
+
+def test_a_model_with_a_sky_keeps_it():
+    with RobotRenderer(made("Hopper")) as renderer:
+        assert (renderer.frame()[0, 0] < 200).any()
+
+
 def test_the_slow_options_are_off():
     with RobotRenderer(made("Ant")) as renderer:
         assert renderer._model.vis.quality.shadowsize == 0

@@ -24,6 +24,7 @@ messages.install_handler()
 
 Frame = NDArray[np.uint8]  # [height, width, 3]
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_SKY = 236, 240, 245  # RGB, for a model that has no sky of its own
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ class RobotRenderer:
         self._centre, self._radius, height_range = _extent(self._model)
         is_flat = height_range < 0.1 * self._radius  # as Swimmer is: seen from above
         self._view = self._make_view(camera or Camera(elevation=-40.0 if is_flat else -15.0))
+        self._has_sky = bool(np.any(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX))
 
     def frame(self, index: int | None = None) -> Frame:
         """The robot as it stands now, ``[height, width, 3]``, a new array.
@@ -123,7 +125,10 @@ class RobotRenderer:
         mujoco.mj_camlight(self._model, self._data)
         self._look_at(self._data.subtree_com[0])
         self._renderer.update_scene(self._data, self._view)
-        return self._renderer.render()
+        frame = self._renderer.render()
+        if not self._has_sky:  # MuJoCo leaves black what nothing covers
+            frame[~frame.any(axis=2)] = _SKY
+        return frame
 
     def close(self) -> None:
         """Free the OpenGL context; further frames are not possible."""
