@@ -7,6 +7,9 @@
 Jupyter Book caches executed notebooks by their cells alone. A chapter also depends on the package, the data and the
 pinned versions, so the cache lives in a folder named by a digest of those: change one and every notebook runs again.
 Jupyter Book executes one notebook after another. So what the cache lacks is executed beforehand, several at a time.
+
+The live robot needs packages from npm. Where npm cannot be reached the book has films in its place, and the next run
+tries again.
 """
 
 import argparse
@@ -23,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "_build"
 INDEX = BUILD / "html" / "index.html"
 STAMP = BUILD / "built-from"
+LIVE = BUILD / "live"  # what the live robot loads, copied into the book
 AT_ONCE = min(4, os.cpu_count() or 1)  # notebooks; each takes one core and up to 1 GB
 CODE = (
     "src",
@@ -105,6 +109,25 @@ def build(code: str) -> int:
     ).returncode
 
 
+def add_live_robot() -> str:
+    """Put the live robot's files into the built book; return why there are only films, or nothing."""
+    sys.path.insert(0, str(ROOT / "src"))
+    from inbounds.book.live import site  # not above: it takes seconds, and mostly nothing changed
+
+    why = site.write(LIVE)
+    target = INDEX.parent / "_static" / "live"
+    shutil.rmtree(target, ignore_errors=True)
+    shutil.copytree(LIVE, target)
+    return why
+
+
+def stamp(everything: str, why: str) -> None:
+    """Note what the book was built from; what lacks the live robot is not up to date."""
+    STAMP.write_text(everything if not why else f"{everything} films only")
+    if why:
+        print(f"The live robot: films only. {why}. The next `make book` tries again.")
+
+
 def zip_book() -> Path:
     """Write one file to read offline: unpack it anywhere and open index.html."""
     sys.path.insert(0, str(ROOT / "src"))
@@ -127,8 +150,12 @@ def main() -> int:
         shutil.rmtree(BUILD, ignore_errors=True)
     start, code = time.perf_counter(), digest(*CODE)
     everything = f"{code} {digest(*PAGES)}"
-    if INDEX.exists() and STAMP.exists() and STAMP.read_text() == everything:
+    built_from = STAMP.read_text() if INDEX.exists() and STAMP.exists() else ""
+    if built_from == everything:
         print("The book is up to date.")
+    elif built_from == f"{everything} films only":
+        print("The book is up to date, but for the live robot.")
+        stamp(everything, add_live_robot())
     else:
         print("Executing the notebooks and building the pages ...", flush=True)
         if status := build(code):
@@ -140,7 +167,7 @@ def main() -> int:
         import student_copies  # not above: it takes a second, and mostly nothing changed
 
         student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
-        STAMP.write_text(everything)
+        stamp(everything, add_live_robot())
         print(f"Built in {time.perf_counter() - start:.0f} s.")
     if args.zip:
         print(f"Zipped: {zip_book()}")

@@ -2,7 +2,8 @@
 
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
-* BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one.
+* BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
+  a live robot loads two small scripts, which load the rest when the reader asks for it.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
@@ -26,6 +27,8 @@ from inbounds.book.explorables.frame import javascript_files
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
+LIVE_FOLDER = "live"  # filled by tools/build_book.py
+LIVE_ROBOT = 'class="inbounds-live-robot"'
 
 
 def use_named_cache(app: Sphinx, config: Config) -> None:
@@ -46,11 +49,14 @@ def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
 def choose_scripts(
     app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
-    """Drop thebe's scripts from every page; add the explorables' scripts to the pages that need them."""
+    """Drop thebe's scripts from every page; add those of explorables and live robots to the pages that need them."""
     context["default_mode"] = "auto"  # follow the system; the theme logs an error where this is empty
     if EXPLORABLE in context.get("body", ""):
         for script in javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
+    if LIVE_ROBOT in context.get("body", ""):
+        for name in ("status.js", "boot.js"):  # all else is loaded when the reader asks for it
+            app.add_js_file(f"{LIVE_FOLDER}/{name}")
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
 
 

@@ -23,10 +23,11 @@ def test_a_depth_page_hangs_together_with_its_chapter(name: str) -> None:
 
 
 def test_every_notebook_is_on_one_page_of_the_book() -> None:
-    """Front page and *Which policy?* come first; whatever else is there is a core chapter or goes deeper."""
+    """Front page, *Which policy?* and the live robot come first; whatever else is there is core or goes deeper."""
     assert set(anatomy.PAGES.core) & set(anatomy.PAGES.depth) == set()
     stored = {path.stem for path in NOTEBOOKS.glob("*.ipynb")}
-    assert {*anatomy.PAGES.core, *anatomy.PAGES.depth, "front_page", "which_policy"} == stored
+    first = {"front_page", "which_policy", "live_robot"}
+    assert {*anatomy.PAGES.core, *anatomy.PAGES.depth, *first} == stored
 
 
 def changed(tmp_path: Path, change: Callable[[str], str]) -> Path:

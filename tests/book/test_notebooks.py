@@ -21,6 +21,8 @@ REFERENCE_PAGES = {
     # Six answers with their evidence, for who only wants to know what to use. Its words follow from the cells by rules
     # that tests/book/report/test_equal_start.py holds; its code is run by tests/book/test_which_policy.py.
     "which_policy",
+    # A robot to play with, and how far it is the study's; tests/book/live and tests/pages/test_live_robot.py hold it.
+    "live_robot",
     # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
     # every entry must have its own check (`test_every_erratum_is_checked`).
     "errata",

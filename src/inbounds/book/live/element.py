@@ -1,0 +1,104 @@
+"""The live robot as an element of a page: films, and a button that brings the robots to life."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.live.export import NAMES
+from inbounds.book.templates import macros
+from inbounds.study.grid import ROBOTS, THESIS
+
+_HERE = Path(__file__).parent
+_COLORS = {
+    "light": {"ink": "#22272d", "line": "#5f6770", "box": "#e4e9ef", "clip": "#d1006c", "sky": "#e9eef4"},
+    "dark": {"ink": "#ced6dd", "line": "#9ca4af", "box": "#2c3644", "clip": "#ff6fae", "sky": "#1b222c"},
+}
+POLICIES = tuple(f"{algorithm}-{family}" for algorithm, family in THESIS)
+"""What may move a robot: columns of arm 1, by algorithm and family."""
+
+
+class Films(Protocol):
+    """What stands on the page until the robots are asked for: `study_pages.films_of`, or a `VideoRow`."""
+
+    def _repr_html_(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class LiveRobot:
+    """One or two robots that run in the reader's browser; a notebook shows the films.
+
+    Made by `live_robot`, which has an example.
+    """
+
+    films: Films
+    """Shown until the reader asks for the robots, and where they cannot run."""
+    robot: str
+    """As in `inbounds.study.grid.ROBOTS`."""
+    left: str
+    """What moves the first robot, of `POLICIES`."""
+    right: str
+    """What moves the second; empty for none."""
+    seed: int
+    """With which they were trained."""
+
+    def __repr__(self) -> str:
+        """Return a line that never changes."""
+        return f"Live robot: {self.robot}, {self.left}{f' beside {self.right}' if self.right else ''}"
+
+    def _repr_html_(self) -> str:
+        return str(
+            macros("live").robot(
+                self.films._repr_html_(), self.robot, self.left, self.right, self.seed, style_sheet()
+            )
+        )
+
+
+def live_robot(
+    films: Films, robot: str = "HalfCheetah", left: str = "ppo-gaussian", right: str = "ppo-logit-normal", seed: int = 0
+) -> LiveRobot:
+    """Return an element for a page; in the built book it has a button that starts the robots.
+
+    Args:
+        films: what stands there until then.
+        robot: as in `inbounds.study.grid.ROBOTS`.
+        left: what moves the first robot: algorithm and family, as in `POLICIES`.
+        right: what moves the second; empty for none.
+        seed: with which both were trained, 0 to 9.
+
+    Raises:
+        ValueError: there is no such robot, or no such policy.
+
+    Example:
+        >>> from inbounds.book.drawing.videos import VideoRow
+        >>> live_robot(VideoRow([]), "Hopper", "ppo-beta")
+        Live robot: Hopper, ppo-beta beside ppo-logit-normal
+    """
+    if robot not in ROBOTS:
+        raise ValueError(f"there is no robot {robot!r}; there are {', '.join(ROBOTS)}")
+    for policy in (left, right or left):
+        if policy not in POLICIES:
+            raise ValueError(f"no policy {policy!r} was trained; there are {', '.join(POLICIES)}")
+    return LiveRobot(films, robot, left, right, seed)
+
+
+@functools.cache
+def style_sheet() -> str:
+    """Return the element's style, with the families' colours for both themes.
+
+    Example:
+        >>> "--inbounds-live-beta: #1F8277" in style_sheet()
+        True
+    """
+    blocks = []
+    for theme, selector in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
+        families = {
+            name: LOOKS[name].color if theme == "light" else LOOKS[name].color_on_dark for name in NAMES
+        }
+        colors = _COLORS[theme] | families
+        variables = " ".join(f"--inbounds-live-{key}: {value};" for key, value in colors.items())
+        blocks.append(f"{selector}.inbounds-live-robot {{ {variables} }}")
+    return "\n".join([*blocks, (_HERE / "live.css").read_text(encoding="utf8")])

@@ -1,0 +1,86 @@
+"""The folder that the built book serves as `_static/live`: scripts, policies, licences, or why there are only films.
+
+    python -m inbounds.book.live.site FOLDER
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from importlib import metadata
+from pathlib import Path
+
+from inbounds.book.live import export
+from inbounds.book.live.packages import JS, NpmError, bundle
+
+NUMERICS = Path(__file__).parents[1] / "explorables" / "numerics.js"
+LARGEST = 20_000_000  # bytes of all policies together
+
+
+def scripts() -> list[Path]:
+    """Return the scripts of the page's own, in the order in which they can be run.
+
+    Example:
+        >>> [path.name for path in scripts()][:3]
+        ['numerics.js', 'laws.js', 'policy.js']
+    """
+    names = ("laws", "policy", "noise", "world", "player", "densities", "scene", "dom", "panel", "show", "boot")
+    return [NUMERICS, *(JS / f"{name}.js" for name in names)]
+
+
+def write(target: Path) -> str:
+    """Write the folder anew.
+
+    Args:
+        target: the folder; what was in it goes.
+
+    Returns:
+        An empty text, or why the robots cannot run in this copy of the book: then the page has films alone.
+
+    Raises:
+        ValueError: the policies take more than 20 MB.
+    """
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    shutil.copy2(JS / "boot.js", target / "boot.js")
+    try:
+        made = bundle()
+    except NpmError as error:
+        _say(target, why="The robots do not run in this copy of the book: it was built where npm could not be reached.")
+        return str(error)
+    for path in (*scripts(), *made.iterdir()):
+        shutil.copy2(path, target / path.name)
+    with (target / "licences.txt").open("a", encoding="utf8") as file:
+        file.write(licence_of("mujoco") + licence_of("gymnasium"))  # of the build in npm, and of the robots' models
+    if (total := export.write(target)) > LARGEST:
+        raise ValueError(f"the policies take {total / 1e6:.1f} MB, more than {LARGEST / 1e6:.0f} MB")
+    loaded = sum((target / path.name).stat().st_size for path in (*scripts(), *made.glob("*.js")))
+    _say(target, size=f"This loads {loaded / 1e6:.1f} MB, once, from this book.")
+    return ""
+
+
+def _say(target: Path, **status: str) -> None:
+    (target / "status.js").write_text(
+        "globalThis.inbounds ??= {};\ninbounds.live ??= {};\n"
+        f"inbounds.live.status = {json.dumps(status, ensure_ascii=False)};\n",
+        encoding="utf8",
+    )
+
+
+def licence_of(package: str) -> str:
+    """Return the licences that an installed Python package brings.
+
+    Example:
+        >>> "MIT" in licence_of("gymnasium"), "Apache" in licence_of("mujoco")
+        (True, True)
+    """
+    found = metadata.distribution(package)
+    files = [file for file in found.files or [] if file.name.upper().startswith("LICENSE")]
+    texts = [Path(str(file.locate())).read_text(encoding="utf8") for file in files]
+    return "\n".join([f"\n{package} {found.version}\n", *texts])
+
+
+if __name__ == "__main__":
+    if why := write(Path(sys.argv[1])):
+        print(f"The live robot: films only. {why}")

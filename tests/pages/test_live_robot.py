@@ -1,0 +1,232 @@
+"""The live robot in the built book: it starts when asked, answers its controls, rests off screen, and leaves the films.
+
+Chromium draws WebGL in software here, and a phone is an emulated viewport with touch.
+"""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, sync_playwright
+
+from tests.pages import browser as book
+
+PAGES = book.pages('class="inbounds-live-robot"')
+STATUS = book.HTML / "_static" / "live" / "status.js"
+WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+READY = """() => {
+  const robot = document.querySelector('.inbounds-live-robot');
+  return robot.dataset.state === 'live' || robot.querySelector('.inbounds-live-why').textContent.includes('could not');
+}"""
+PAINTED = """canvas => {
+  const copy = document.createElement('canvas');
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const paint = copy.getContext('2d');
+  paint.drawImage(canvas, 0, 0);
+  const { data } = paint.getImageData(0, 0, copy.width, copy.height);
+  const colors = new Set();
+  for (let i = 0; i < data.length; i += 4) colors.add(`${data[i]} ${data[i + 1]} ${data[i + 2]}`);
+  return colors.size;
+}"""
+
+
+def films_only() -> str:
+    """Why the book was built without the robots, or nothing."""
+    text = STATUS.read_text(encoding="utf8") if STATUS.is_file() else "no status.js"
+    return text if '"why"' in text or "no status" in text else ""
+
+
+needs_robots = pytest.mark.skipif(bool(films_only()), reason=f"the book has films only: {films_only()}")
+
+
+@pytest.fixture(scope="module")
+def webgl() -> Iterator[Browser]:
+    """A Chromium that draws WebGL in software."""
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(
+            executable_path=book.find_chromium(),
+            headless=True,
+            args=[*book.ARGUMENTS, *WEBGL],
+            ignore_default_args=["--hide-scrollbars"],
+        )
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def reader(webgl: Browser) -> Iterator[BrowserContext]:
+    context = webgl.new_context(viewport=book.DESKTOP)
+    context.set_default_timeout(60_000)
+    yield context
+    context.close()
+
+
+def start(context: BrowserContext, url: str) -> Page:
+    """A page whose first live robot runs, with its errors and what it asked for in `seen`."""
+    page = context.new_page()
+    page.seen = []  # type: ignore[attr-defined]
+    page.on("pageerror", lambda error: page.seen.append(str(error)))  # type: ignore[attr-defined]
+    page.on("request", lambda request: page.seen.append(request.url) if outside(request.url, url) else None)  # type: ignore[attr-defined]
+    page.goto(url)
+    page.locator(".inbounds-live-ask button").first.click()
+    page.wait_for_function(READY)
+    assert robot(page).get_attribute("data-state") == "live", robot(page).inner_text()
+    return page
+
+
+def outside(asked: str, url: str) -> bool:
+    return not asked.startswith((url.split("notebooks/")[0], "data:", "blob:"))
+
+
+def robot(page: Page) -> Locator:
+    return page.locator(".inbounds-live-robot").first
+
+
+def reading(page: Page, row: str, side: int = 0) -> float:
+    text = robot(page).locator("table").nth(side).locator("tr", has_text=row).locator("td").inner_text()
+    return float(text.split()[0].replace("−", "-"))
+
+
+def test_some_page_has_a_live_robot() -> None:
+    assert PAGES
+
+
+@needs_robots
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_it_runs(reader: BrowserContext, address: str, name: str, way: str) -> None:
+    page = start(reader, f"{address if way == 'served' else book.HTML.as_uri() + '/'}{name}")
+    page.wait_for_function("() => parseFloat(document.querySelectorAll('.inbounds-live-robot td')[2].textContent) > 0.3")
+    assert page.seen == []  # type: ignore[attr-defined]
+    for canvas in robot(page).locator("canvas").all():
+        assert canvas.evaluate(PAINTED) > 20
+    assert not robot(page).locator(".inbounds-live-film").is_visible()
+    assert reading(page, "Time", 0) == pytest.approx(reading(page, "Time", 1), abs=0.2)
+
+
+@needs_robots
+@pytest.mark.parametrize("name", PAGES)
+def test_it_answers_its_controls(reader: BrowserContext, address: str, name: str) -> None:
+    page = start(reader, address + name)
+    place = robot(page)
+    place.get_by_role("button", name="Pause").click()
+    place.get_by_role("button", name="Same start again").click()
+    page.wait_for_function("() => document.querySelectorAll('.inbounds-live-robot td')[2].textContent === '0.0 s'")
+    place.get_by_role("button", name="One step").click()
+    page.wait_for_function("() => document.querySelectorAll('.inbounds-live-robot td')[2].textContent !== '0.0 s'")
+    # snapped to the bounds: every action is at one
+    first = place.locator(".inbounds-live-one").first
+    first.get_by_label("acts by").select_option("sample-snapped")
+    place.get_by_role("button", name="Same start again").click()
+    for _ in range(3):
+        place.get_by_role("button", name="One step").click()
+    page.wait_for_timeout(300)
+    assert reading(page, "Actions at a bound") == 100
+    # no noise: a second run from the same start is the same run
+    returns = []
+    first.get_by_label("acts by").select_option("sample")
+    first.get_by_label("noise ×").fill("0")
+    for _ in range(2):
+        place.get_by_role("button", name="Same start again").click()
+        for _ in range(4):
+            place.get_by_role("button", name="One step").click()
+        page.wait_for_timeout(300)
+        returns.append(reading(page, "Return"))
+    assert returns[0] == returns[1]
+    assert "return" in place.locator("[aria-live]").inner_text()
+
+
+@needs_robots
+@pytest.mark.parametrize("choice", ["Hopper", "Swimmer", "Walker2d", "Ant", "Humanoid"])
+def test_every_robot_can_be_chosen(reader: BrowserContext, address: str, choice: str) -> None:
+    page = start(reader, address + PAGES[0])
+    robot(page).get_by_label("Robot", exact=True).select_option(choice)
+    page.wait_for_function(f"() => document.querySelector('.inbounds-live-view').ariaLabel.startsWith('{choice}')")
+    page.wait_for_timeout(1500)
+    assert page.seen == []  # type: ignore[attr-defined]
+    assert robot(page).locator(".inbounds-live-view canvas").first.evaluate(PAINTED) > 20
+
+
+@needs_robots
+def test_a_push_moves_it(reader: BrowserContext, address: str) -> None:
+    """Two runs of the same robot from the same start, one of them pushed."""
+    page = start(reader, address + PAGES[0])
+    place = robot(page)
+    place.get_by_role("button", name="Pause").click()
+    speeds = []
+    for push in (False, True):
+        place.get_by_role("button", name="Same start again").click()
+        if push:
+            place.locator(".inbounds-live-view").first.press("ArrowRight")
+        for _ in range(4):
+            place.get_by_role("button", name="One step").click()
+        page.wait_for_timeout(300)
+        speeds.append(reading(page, "Speed"))
+    assert speeds[1] > speeds[0] + 0.3
+
+
+@needs_robots
+def test_it_rests_off_screen(reader: BrowserContext, address: str) -> None:
+    page = start(reader, address + PAGES[0])
+    page.evaluate("document.querySelector('.inbounds-live-robot').style.marginTop = '4000px'; scrollTo(0, 0)")
+    page.wait_for_timeout(800)
+    before = reading(page, "Time")
+    page.wait_for_timeout(800)
+    assert reading(page, "Time") == before
+
+
+@needs_robots
+def test_it_waits_where_motion_is_unwelcome(webgl: Browser, address: str) -> None:
+    context = webgl.new_context(reduced_motion="reduce")
+    page = start(context, address + PAGES[0])
+    page.wait_for_timeout(500)
+    assert reading(page, "Time") == 0
+    assert "reduced motion" in robot(page).locator("[aria-live]").inner_text()
+    robot(page).get_by_role("button", name="Play").click()
+    page.wait_for_function("() => parseFloat(document.querySelectorAll('.inbounds-live-robot td')[2].textContent) > 0")
+    context.close()
+
+
+@needs_robots
+def test_it_fits_a_phone(webgl: Browser, address: str) -> None:
+    context = webgl.new_context(viewport=book.PHONE, has_touch=True, is_mobile=True)
+    page = start(context, address + PAGES[0])
+    assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    for control in robot(page).locator("select, button:visible, input").all():
+        box = control.bounding_box()
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= book.PHONE["width"]
+    context.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("lack", ["WebAssembly", "DecompressionStream", "WebGL 2"])
+def test_the_films_stay_where_it_cannot_run(
+    context: BrowserContext, address: str, name: str, lack: str
+) -> None:
+    page = context.new_page()
+    if lack == "WebGL 2":
+        page.add_init_script(
+            "const get = HTMLCanvasElement.prototype.getContext;"
+            "HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {"
+            " return kind.startsWith('webgl') ? null : get.call(this, kind, ...rest); }"
+        )
+    else:
+        page.add_init_script(f"delete globalThis.{lack}")
+    page.goto(address + name)
+    place = robot(page)
+    assert place.locator("video").first.is_visible()
+    assert not place.locator(".inbounds-live-ask button").is_visible()
+    assert (lack if not films_only() else "npm") in place.locator(".inbounds-live-why").inner_text()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_nothing_of_it_weighs_on_a_page_before_it_is_asked_for(
+    context: BrowserContext, address: str, name: str
+) -> None:
+    page = context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address + name, wait_until="networkidle")
+    ours = sorted(url.split("/live/")[1].split("?")[0] for url in asked if "/live/" in url)
+    assert ours == ["boot.js", "status.js"]
