@@ -1,8 +1,9 @@
 """Is the robot in the browser the robot of the study? One step, a free run, and whole episodes, in node.
 
 The page runs MuJoCo's WebAssembly build, some versions behind Python's. From a recorded state one step is repeated
-with the same action; from a start the same policy then runs free in both, acting by its median, until the observations
-part; and 20 episodes with noise are compared with those that the study played. `results/live.json` holds what was found.
+with the same action; from a start the same policy then runs free in both, acting by its median, until the
+observations part; and 20 episodes with noise are compared with those that the study played. What was found is in
+`results/live.json`.
 
     python -m benchmarks.live          about ten minutes
     python -m benchmarks.live --quick  does it run? half a minute
@@ -106,6 +107,7 @@ def episodes(cell: Cell, count: int) -> dict[str, Any]:
 
 
 def main() -> None:
+    """Measure, print, and store what was found."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

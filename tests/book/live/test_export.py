@@ -2,15 +2,16 @@
 
 import base64
 import gzip
+import itertools
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from inbounds.book.drawing.videos import VideoRow
 from inbounds.book.live import export, site
 from inbounds.book.live.element import POLICIES, live_robot, style_sheet
-from inbounds.book.drawing.videos import VideoRow
 from inbounds.book.live.packages import without_custom_sections
 from inbounds.learning import Trainer
 from inbounds.learning.storage.run_store import load_policies
@@ -47,9 +48,13 @@ def test_a_policy_s_numbers_are_the_study_s(written: Path) -> None:
     stored = read(written / "policies" / "ant-trpo-logit-normal-4.js")
     policy = load_policies(StudyFolder.shipped().policy_files(cell)[0])[4]
     data = gzip.decompress(base64.b64decode(stored["numbers"]))
-    count = sum(out * (into + 1) for into, out in zip(stored["sizes"], stored["sizes"][1:]))
-    np.testing.assert_array_equal(np.frombuffer(data[: 4 * count], np.float32), policy._network.theta[0].numpy())
-    np.testing.assert_array_equal(np.frombuffer(data[4 * count :])[: stored["sizes"][0]], policy._normalizer.mean[0])
+    count = sum(out * (into + 1) for into, out in itertools.pairwise(stored["sizes"]))
+    np.testing.assert_array_equal(
+        np.frombuffer(data[: 4 * count], np.float32), policy._network.theta[0].numpy()
+    )
+    np.testing.assert_array_equal(
+        np.frombuffer(data[4 * count :])[: stored["sizes"][0]], policy._normalizer.mean[0]
+    )
     assert len(data) == 4 * count + 2 * 8 * stored["sizes"][0]
     assert stored["family"] == "logit-normal"
 
@@ -94,9 +99,11 @@ def test_an_element_is_fixed_and_asks_no_other_host() -> None:
     assert "--inbounds-live-logit-normal: #0E2F66" in style_sheet()
 
 
-@pytest.mark.parametrize(("robot", "left"), [("Cartpole", "ppo-beta"), ("Hopper", "trpo-beta"), ("Hopper", "")])
+@pytest.mark.parametrize(
+    ("robot", "left"), [("Cartpole", "ppo-beta"), ("Hopper", "trpo-beta"), ("Hopper", "")]
+)
 def test_what_was_not_trained_is_refused(robot: str, left: str) -> None:
-    with pytest.raises(ValueError, match="there (is no robot|are ppo-gaussian)"):
+    with pytest.raises(ValueError, match=r"there (is no robot|are ppo-gaussian)"):
         live_robot(VideoRow([]), robot, left)
 
 

@@ -15,8 +15,10 @@ from inbounds.study.store import StudyFolder
 
 LIMITS = {"log_std_min": -10.0, "log_std_max": 1.0, "concentration_max": 80.0}
 RNG = np.random.default_rng(3)
-OUTPUTS = np.concatenate(  # [N, 2]: of one motor; beyond the clips, on both sides of the logit-normal's second peak
-    [RNG.normal(0, 2, (60, 2)), [[0.3, 5.0], [-0.4, 1.0], [2.0, -20.0], [300.0, 0.0], [-40.0, -40.0]]]
+OUTPUTS = (
+    np.concatenate(  # [N, 2]: of one motor; beyond the clips, on both sides of the logit-normal's second peak
+        [RNG.normal(0, 2, (60, 2)), [[0.3, 5.0], [-0.4, 1.0], [2.0, -20.0], [300.0, 0.0], [-40.0, -40.0]]]
+    )
 )
 UNITS = np.linspace(-0.99, 0.99, 23)
 NOISE = np.array([-3.5, -1.0, 0.0, 0.4, 2.9])
@@ -34,7 +36,13 @@ return values.outputs.map(([a, b]) => {
 
 @pytest.mark.parametrize("family", export.NAMES)
 def test_a_law_is_the_package_s(family: str) -> None:
-    given = {"family": family, "outputs": OUTPUTS.tolist(), "limits": LIMITS, "units": UNITS.tolist(), "noise": NOISE.tolist()}
+    given = {
+        "family": family,
+        "outputs": OUTPUTS.tolist(),
+        "limits": LIMITS,
+        "units": UNITS.tolist(),
+        "noise": NOISE.tolist(),
+    }
     told = run(OF_A_LAW, given, engine=False)
     policy = Policy(PolicyConfig(family), -np.ones(1), np.ones(1))
     for outputs, law in zip(torch.from_numpy(OUTPUTS), told, strict=True):

@@ -58,7 +58,11 @@ class LiveRobot:
 
 
 def live_robot(
-    films: Films, robot: str = "HalfCheetah", left: str = "ppo-gaussian", right: str = "ppo-logit-normal", seed: int = 0
+    films: Films,
+    robot: str = "HalfCheetah",
+    left: str = "ppo-gaussian",
+    right: str = "ppo-logit-normal",
+    seed: int = 0,
 ) -> LiveRobot:
     """Return an element for a page; in the built book it has a button that starts the robots.
 

@@ -39,11 +39,11 @@ _TASK = (
 
 
 def script(place: str, key: str, value: Any) -> str:
-    """Return a script that puts a value where the page looks for it.
+    r"""Return a script that puts a value where the page looks for it.
 
     Example:
         >>> script("robots", "Hopper", {"motors": 3})
-        'inbounds.live.robots["Hopper"] = {"motors": 3};\\n'
+        'inbounds.live.robots["Hopper"] = {"motors": 3};\n'
     """
     text = json.dumps(value, ensure_ascii=False).replace("</", "<\\/")
     return f"inbounds.live.{place}[{json.dumps(key)}] = {text};\n"
@@ -180,7 +180,9 @@ def catalogue() -> str:
         "robots": {name: name for name in ROBOTS},
         "policies": names,
         "seeds": list(cells[0].config.seeds),
-        "ways": {family: ["sample", *(way for way in ways_of(family) if way != "sample")] for family in NAMES},
+        "ways": {
+            family: ["sample", *(way for way in ways_of(family) if way != "sample")] for family in NAMES
+        },
     }
     return f"inbounds.live.catalogue = {json.dumps(known, ensure_ascii=False)};\n"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,9 @@ const run = () => { for (const file of files) vm.runInThisContext(fs.readFileSyn
 """
 
 
-def run(code: str, values: Any = None, *, files: Sequence[Path] = (), engine: bool = True, patience: float = 900) -> Any:
+def run(
+    code: str, values: Any = None, *, files: Sequence[Path] = (), engine: bool = True, patience: float = 900
+) -> Any:
     """Return what JavaScript returns.
 
     Args:
@@ -58,7 +59,11 @@ def run(code: str, values: Any = None, *, files: Sequence[Path] = (), engine: bo
         [2, 4]
     """
     made = [bundle() / name for name in ("engine.js", "wasm.js")] if engine else []
-    page = [path for path in scripts() if path.name not in ("boot.js", "scene.js", "dom.js", "panel.js", "show.js")]
+    page = [
+        path
+        for path in scripts()
+        if path.name not in ("boot.js", "scene.js", "dom.js", "panel.js", "show.js")
+    ]
     listed = [str(path) for path in (*made, *page, *files)]
     done = subprocess.run(
         [node(), "-e", _DRIVER],
@@ -93,7 +98,9 @@ def run_cell(code: str, cell: Cell, seed: int, values: Any = None, *, untrained:
         >>> run_cell("return player.world.dt", cell, 0)  # doctest: +SKIP
         0.008
     """
-    stored = dict(export.policies(cell, StudyFolder.shipped()))[f"{cell.robot.lower()}-{export.policy_id(cell)}-{seed}"]
+    stored = dict(export.policies(cell, StudyFolder.shipped()))[
+        f"{cell.robot.lower()}-{export.policy_id(cell)}-{seed}"
+    ]
     start = dict(export.starts(cell))[f"{cell.robot.lower()}-{seed}"] if untrained else None
     given = {"robot": export.robot(cell.robot), "stored": stored, "start": start, "values": values}
     make = """

@@ -67,7 +67,15 @@ def _make(target: Path) -> None:
         folder = Path(name)
         for each in _INPUTS:
             shutil.copy2(JS / each, folder / each)
-        _npm(folder, "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--fetch-retries=1", "--loglevel=error")
+        _npm(
+            folder,
+            "ci",
+            "--ignore-scripts",
+            "--no-audit",
+            "--no-fund",
+            "--fetch-retries=1",
+            "--loglevel=error",
+        )
         modules = folder / "node_modules"
         made = folder / "made"
         made.mkdir()
@@ -120,11 +128,19 @@ def _npm(folder: Path, *arguments: str) -> None:
 
 def _esbuild(folder: Path, entry: str, out: Path, variable: str) -> None:
     """Bundle an entry and what it imports into one classic script, which sets a global variable."""
-    command = [
-        folder / "node_modules" / ".bin" / "esbuild", entry, "--bundle", "--minify", "--format=iife",
-        f"--global-name={variable}", "--platform=browser", "--target=es2022", "--legal-comments=none",
-        "--external:module", "--external:node:*", '--define:import.meta.url="file:///mujoco.js"', "--log-level=error", f"--outfile={out}",
-    ]  # fmt: skip
+    options = {
+        "format": "iife",
+        "global-name": variable,
+        "platform": "browser",
+        "target": "es2022",
+        "legal-comments": "none",  # they ship in licences.txt
+        "log-level": "error",
+        "outfile": str(out),
+    }
+    command = [str(folder / "node_modules" / ".bin" / "esbuild"), entry, "--bundle", "--minify"]
+    command += [f"--{name}={value}" for name, value in options.items()]
+    # What MuJoCo's loader would import of node, and the address of a module, which a classic script has not.
+    command += ["--external:module", "--external:node:*", '--define:import.meta.url="file:///mujoco.js"']
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise NpmError(f"esbuild could not bundle {entry}: {done.stderr.strip()[:300]}")
@@ -132,7 +148,9 @@ def _esbuild(folder: Path, entry: str, out: Path, variable: str) -> None:
 
 def _wasm(module: Path) -> str:
     """Return the script with the WebAssembly module, without its custom sections."""
-    text = base64.b64encode(gzip.compress(without_custom_sections(module.read_bytes()), 9, mtime=0)).decode("ascii")
+    text = base64.b64encode(gzip.compress(without_custom_sections(module.read_bytes()), 9, mtime=0)).decode(
+        "ascii"
+    )
     return f'inbounds.live.wasm = "{text}";\n'
 
 
@@ -178,5 +196,7 @@ def _licences(modules: Path) -> Iterator[str]:
         folder = modules / name
         about = json.loads((folder / "package.json").read_text(encoding="utf8"))
         yield f"{name} {about['version']} ({about['license']})\n"
-        found = [path for path in sorted(folder.iterdir()) if path.name.upper().startswith(("LICENSE", "NOTICE"))]
+        found = [
+            path for path in sorted(folder.iterdir()) if path.name.upper().startswith(("LICENSE", "NOTICE"))
+        ]
         yield from (path.read_text(encoding="utf8") for path in found)

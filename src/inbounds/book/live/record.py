@@ -14,7 +14,7 @@ from inbounds.study.grid import Cell
 from inbounds.study.store import StudyFolder
 
 TOLERANCES: Mapping[str, float] = {"obs": 1e-9, "obs of Humanoid": 2e-4, "reward": 1e-6, "action": 1e-5}
-"""How far one step in JavaScript may be off: an observation and a reward relative to 1 + their size, an action absolute.
+"""How far a step in JavaScript may be off: an observation and a reward relative to 1 + their size, an action absolute.
 
 Rewards and actions are computed in float32 here and in float64 there. Humanoid's contacts are solved by an iteration
 that ends before it has converged, and MuJoCo's versions order it differently.
@@ -54,13 +54,17 @@ def steps(cell: Cell, seed: int, count: int = 50, apart: int = 7) -> Iterator[di
             if before is not None:
                 after = infos["final_obs"][0] if "final_obs" in infos else obs[0]
                 ways = {way: policy.act(seen[0], way).tolist() for way in ("mean", "median", "mode")}
-                yield before | ways | {
-                    "seen": seen[0].tolist(),
-                    "action": action[0].tolist(),
-                    "obs": np.asarray(after, np.float64).tolist(),
-                    "reward": float(reward[0]),
-                    "terminated": bool(terminated[0]),
-                }
+                yield (
+                    before
+                    | ways
+                    | {
+                        "seen": seen[0].tolist(),
+                        "action": action[0].tolist(),
+                        "obs": np.asarray(after, np.float64).tolist(),
+                        "reward": float(reward[0]),
+                        "terminated": bool(terminated[0]),
+                    }
+                )
 
 
 def _state(env: RobotVectorEnv) -> dict[str, Any]:

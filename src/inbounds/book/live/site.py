@@ -1,6 +1,6 @@
 """The folder that the built book serves as `_static/live`: scripts, policies, licences, or why there are only films.
 
-    python -m inbounds.book.live.site FOLDER
+python -m inbounds.book.live.site FOLDER
 """
 
 from __future__ import annotations
@@ -25,7 +25,19 @@ def scripts() -> list[Path]:
         >>> [path.name for path in scripts()][:3]
         ['numerics.js', 'laws.js', 'policy.js']
     """
-    names = ("laws", "policy", "noise", "world", "player", "densities", "scene", "dom", "panel", "show", "boot")
+    names = (
+        "laws",
+        "policy",
+        "noise",
+        "world",
+        "player",
+        "densities",
+        "scene",
+        "dom",
+        "panel",
+        "show",
+        "boot",
+    )
     return [NUMERICS, *(JS / f"{name}.js" for name in names)]
 
 
@@ -47,12 +59,17 @@ def write(target: Path) -> str:
     try:
         made = bundle()
     except NpmError as error:
-        _say(target, why="The robots do not run in this copy of the book: it was built where npm could not be reached.")
+        _say(
+            target,
+            why="The robots do not run in this copy of the book: it was built where npm could not be reached.",
+        )
         return str(error)
     for path in (*scripts(), *made.iterdir()):
         shutil.copy2(path, target / path.name)
     with (target / "licences.txt").open("a", encoding="utf8") as file:
-        file.write(licence_of("mujoco") + licence_of("gymnasium"))  # of the build in npm, and of the robots' models
+        file.write(
+            licence_of("mujoco") + licence_of("gymnasium")
+        )  # of the build in npm, and of the robots' models
     if (total := export.write(target)) > LARGEST:
         raise ValueError(f"the policies take {total / 1e6:.1f} MB, more than {LARGEST / 1e6:.0f} MB")
     loaded = sum((target / path.name).stat().st_size for path in (*scripts(), *made.glob("*.js")))

@@ -15,7 +15,7 @@ inbounds.live.dom = (() => {
 
   // A labelled choice; `options` maps values to texts.
   function choice(label, options, chosen, onChange) {
-    const select = make("select");
+    const select = make("select", { "aria-label": label });
     const fill = (entries, value) => {
       select.replaceChildren(...Object.entries(entries).map(([key, text]) => make("option", { value: key }, text)));
       select.value = value in entries ? value : Object.keys(entries)[0];
@@ -27,7 +27,7 @@ inbounds.live.dom = (() => {
 
   // A labelled slider that shows its value.
   function slider(label, { min, max, step, value, text }, onInput) {
-    const shown = make("output", {}, text(value));
+    const shown = make("span", { className: "inbounds-live-value" }, text(value));
     const input = make("input", { type: "range", min, max, step, value, "aria-label": label });
     input.addEventListener("input", () => {
       shown.textContent = text(Number(input.value));
