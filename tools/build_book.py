@@ -35,6 +35,7 @@ CODE = (
     "benchmarks/equivalence.py",
     "benchmarks/report.py",
     "benchmarks/validate.py",
+    "benchmarks/results/live.json",
     "benchmarks/results/speed.json",
     "benchmarks/results/validation/curves.parquet",
     "benchmarks/results/validation/validation.json",

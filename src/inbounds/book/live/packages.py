@@ -74,6 +74,7 @@ def _make(target: Path) -> None:
             "--no-audit",
             "--no-fund",
             "--fetch-retries=1",
+            "--fetch-retry-mintimeout=1000",
             "--loglevel=error",
         )
         modules = folder / "node_modules"
@@ -137,7 +138,10 @@ def _esbuild(folder: Path, entry: str, out: Path, variable: str) -> None:
         "log-level": "error",
         "outfile": str(out),
     }
-    command = [str(folder / "node_modules" / ".bin" / "esbuild"), entry, "--bundle", "--minify"]
+    program = (
+        folder / "node_modules" / "esbuild" / "bin" / "esbuild"
+    )  # a script of node, as no install script has run
+    command = [str(node()), str(program), entry, "--bundle", "--minify"]
     command += [f"--{name}={value}" for name, value in options.items()]
     # What MuJoCo's loader would import of node, and the address of a module, which a classic script has not.
     command += ["--external:module", "--external:node:*", '--define:import.meta.url="file:///mujoco.js"']
