@@ -4,15 +4,18 @@
 
 An exercise is a stub, a solution and a grader's cell. In the book the solution comes after the stub and takes its
 place; here it is left out, prose and cells alike, from `{solution-start}` to `{solution-end}`, and so is any other
-cell with the tag `solution`. The book's download button hands out the same copies (`tools/build_book.py`).
+cell with the tag `solution`. JupyterLab does not know the role that shows a glued number; in a copy the number itself
+stands there, as the book has it. The book's download button hands out the same copies (`tools/build_book.py`).
 
 A copy that a student has changed is never overwritten.
 """
 
 import argparse
+import ast
 import copy
 import hashlib
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,6 +28,10 @@ ROOT = Path(__file__).resolve().parents[1]
 LEDGER = ".handed-out.json"
 """In the students' folder: the digest of each notebook as it was handed out."""
 INSTEAD = "*The solution is in the book.*"
+GLUED = re.compile(r"\{glue:text\}`(?:([^`:]+\.ipynb)::)?([^`:]+)(?::([^`]*))?`")
+"""The notebook, where it is another one, the name and the format of a glued number."""
+SHOWN_LATER = re.compile(r"^```\{glue\}[^\n]*\n```$", re.MULTILINE)
+"""A directive that shows above what a later cell makes."""
 
 
 def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
@@ -37,14 +44,15 @@ def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         ValueError: the markers of a solution do not pair.
     """
     student = copy.deepcopy(notebook)
-    student.cells, inside = [], False
+    student.cells, inside, values = [], False, {"": stored_values(notebook)}
     for cell in copy.deepcopy(notebook.cells):
         if cell.cell_type == "code":
             if inside or "solution" in cell.metadata.get("tags", []):
                 continue
             cell.update(outputs=[], execution_count=None)
         else:
-            cell.source, inside = without_solutions(cell.source, inside)
+            left, inside = without_solutions(cell.source, inside)
+            cell.source = with_numbers(left, values)
         if cell.source.strip():
             student.cells.append(cell)
     if inside:
@@ -76,6 +84,43 @@ def without_solutions(text: str, inside: bool) -> tuple[str, bool]:
         elif not inside:
             left.append(line)
     return "\n".join(left).strip("\n"), inside
+
+
+def stored_values(notebook: nbformat.NotebookNode) -> dict[str, str]:
+    """Return what a notebook glues, as its outputs keep it: the `repr` of each value, by name."""
+    return {
+        output.metadata.scrapbook.name: text
+        for cell in notebook.cells
+        for output in cell.get("outputs", [])
+        if "scrapbook" in output.get("metadata", {})
+        for kind, text in output.get("data", {}).items()
+        if kind.endswith("text/plain")
+    }
+
+
+def with_numbers(text: str, values: dict[str, dict[str, str]]) -> str:
+    """Put glued numbers in the place of the roles that show them.
+
+    Args:
+        text: of one cell.
+        values: notebook → name → `repr` of the value; "" is the notebook itself, others are read when they are met.
+
+    Returns:
+        The text. A role whose value is not stored stays as it is.
+    """
+
+    def shown(role: re.Match[str]) -> str:
+        other, name, how = role[1] or "", role[2], role[3] or ""
+        if other not in values:
+            values[other] = stored_values(nbformat.read(ROOT / "notebooks" / other, as_version=4))
+        if name not in values[other]:
+            return role[0]
+        try:
+            return format(ast.literal_eval(values[other][name]), how)
+        except (SyntaxError, ValueError):  # no literal: shown as it is stored
+            return values[other][name]
+
+    return SHOWN_LATER.sub("*A later cell shows this.*", GLUED.sub(shown, text))
 
 
 def written(path: Path) -> str:

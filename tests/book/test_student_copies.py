@@ -55,6 +55,28 @@ def test_a_chapters_copy_has_no_solution_and_lacks_nothing_else(path: Path) -> N
     assert not any(tagged(cell) for cell in student.cells)
 
 
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_a_copy_shows_every_number(path: Path) -> None:
+    """JupyterLab shows a glue role as an error, and no student can predict from it or read an answer."""
+    prose = "\n".join(
+        cell.source
+        for cell in tool.student_copy(nbformat.read(path, as_version=4)).cells
+        if cell.cell_type == "markdown"
+    )
+    assert "{glue" not in prose
+
+
+def test_numbers_are_written_as_the_book_writes_them() -> None:
+    values = {"": {"half": "0.5", "told": "'3 [1, 5], above'", "odd": "np.float64(2.5)"}}
+    text = "{glue:text}`half:.0%` of {glue:text}`told`; {glue:text}`odd`, {glue:text}`nowhere:.2f`"
+    assert (
+        tool.with_numbers(text, values) == "50% of 3 [1, 5], above; np.float64(2.5), {glue:text}`nowhere:.2f`"
+    )
+    assert (
+        tool.with_numbers("a\n\n```{glue} films\n```\n\nb", values) == "a\n\n*A later cell shows this.*\n\nb"
+    )
+
+
 def between_markers(chapter: nbformat.NotebookNode, cell: nbformat.NotebookNode) -> bool:
     """Whether more solutions begin than end before the end of this cell, or it holds nothing but a marker."""
     before = [c.source for c in chapter.cells[: chapter.cells.index(cell) + 1] if c.cell_type == "markdown"]
