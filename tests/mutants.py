@@ -20,6 +20,27 @@ class Mutant:
 
 MUTANTS: tuple[Mutant, ...] = (
     Mutant(
+        "the page's logit-normal takes the lower of two peaks",
+        "book/live/js/laws.js",
+        "return squash(mu >= 0 ? modes[modes.length - 1] : modes[0]);",
+        "return squash(mu < 0 ? modes[modes.length - 1] : modes[0]);",
+        "tests/book/live/test_laws.py::test_a_law_is_the_package_s",
+    ),
+    Mutant(
+        "the page's Beta has no cap",
+        "book/live/js/laws.js",
+        "clamp(1 + softplus(x), 1, limits.concentration_max)",
+        "(1 + softplus(x))",
+        "tests/book/live/test_laws.py::test_a_law_is_the_package_s",
+    ),
+    Mutant(
+        "a WebAssembly module loses what runs",
+        "book/live/packages.py",
+        "if kind != 0)",
+        "if kind == 0)",
+        "tests/book/live/test_export.py::test_a_module_keeps_what_runs",
+    ),
+    Mutant(
         "a quiet start forgets the box's units",
         "integrations/stable_baselines3.py",
         "policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())",

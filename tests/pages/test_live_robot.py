@@ -204,6 +204,11 @@ def test_it_fits_a_phone(webgl: Browser, address: str) -> None:
         assert box is not None
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= book.PHONE["width"]
+    context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 4})
+    before = reading(page, "Time")
+    page.wait_for_function(
+        f"() => parseFloat(document.querySelectorAll('.inbounds-live-robot td')[2].textContent) > {before + 0.5}"
+    )
     context.close()
 
 
