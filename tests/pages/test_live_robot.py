@@ -147,7 +147,10 @@ def test_every_robot_can_be_chosen(reader: BrowserContext, address: str, choice:
     page.wait_for_function(
         f"() => document.querySelector('.inbounds-live-view').ariaLabel.startsWith('{choice}')"
     )
-    page.wait_for_timeout(1500)
+    page.wait_for_function(
+        "() => parseFloat(document.querySelectorAll('.inbounds-live-robot td')[2].textContent) > 0.1"
+    )
+    assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
     assert page.seen == []  # type: ignore[attr-defined]
     assert colours(robot(page).locator(".inbounds-live-view canvas").first) > 20
 

@@ -110,6 +110,7 @@ inbounds.live.Show = class {
       }
       this.busy = false;
       this.restart(this.start);
+      this.wake();
     });
     if (first) return this.changing;
     return this.changing.catch((error) => {
