@@ -42,7 +42,6 @@ CHAPTERS = [
 
 STUDY_CHAPTERS = {
     # They read what was measured and state no theorem of their own; all else a chapter owes its reader they owe too.
-    "figures_reproduced",
     "one_thing_at_a_time",
     "inside_the_policies",
 }

@@ -11,14 +11,11 @@ from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
-from inbounds.book.report.forests import SERIES, Bar, forest, in_words
+from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.book.report.html import Shown
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
-
-XLABEL = "difference, in fifths of what training adds on the robot"
-"""Of every forest: the second protocol's margin is its unit."""
 
 
 def of(rows: Sequence[Evidence], **which: str) -> list[Evidence]:
@@ -139,7 +136,7 @@ def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
     if not drawn:
         return html.of_study(what, html.NONE_FINISHED)
     alt = f"Differences with 95 percent intervals, a group of rows per robot. {in_words(drawn)}"
-    fig = forest(drawn, xlabel=XLABEL, order=ROBOTS)
+    fig = forest(drawn, xlabel=MARGINS_AS_UNIT, order=ROBOTS)
     return html.of_study(what, html.figure(fig, alt, _caption(panels)), *_waiting(panels))
 
 

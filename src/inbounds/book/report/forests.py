@@ -19,6 +19,8 @@ from inbounds.book.drawing.figures import LOOKS, SHADES, WIDTH, use_style
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import spoken
 
+MARGINS_AS_UNIT = "difference, in fifths of what training adds on the robot"
+"""The label of an axis whose unit is the second protocol's margin."""
 _QUIET, _BAND = "#5F6770", "#DFE3E8"
 
 

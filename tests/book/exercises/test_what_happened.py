@@ -1,4 +1,4 @@
-"""The graders of the reproduced figures pass right answers, and name the known mistakes."""
+"""The graders of *What happened* pass right answers, and name the known mistakes."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inbounds.book.exercises import figures_reproduced as graders
+from inbounds.book.exercises import what_happened as graders
 from inbounds.study.statistics import holm
 
 

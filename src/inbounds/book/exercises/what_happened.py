@@ -1,4 +1,4 @@
-"""Graders of the chapter *The thesis's figures, reproduced* (`judging` tells how one works)."""
+"""Graders of the chapter *What happened* (`judging` tells how one works)."""
 
 from collections.abc import Callable
 from typing import Any
