@@ -110,7 +110,7 @@ def middle_seed(outcome: Outcome) -> int:
 
 def _caption(name: str, outcome: Outcome) -> str:
     seed = middle_seed(outcome)
-    return f"{name}, seed {outcome.cell.seeds[seed]}: {outcome.ways['median'][seed]:.0f}"
+    return f"{name}, seed {outcome.cell.seeds[seed]}: {outcome.ways['median'][seed]:.0f} points"
 
 
 def _film(outcomes: Outcomes, outcome: Outcome, seconds: float) -> Film:
