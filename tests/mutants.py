@@ -936,4 +936,18 @@ MUTANTS: tuple[Mutant, ...] = (
         "if config.engine:",
         "tests/study/test_grid.py::test_autograds_digests_are_those_of_the_first_study",
     ),
+    Mutant(
+        "a finished episode goes on earning",
+        "book/own_task/comparing.py",
+        "earned += np.where(running, reward, 0.0)",
+        "earned += reward",
+        "tests/book/own_task/test_comparing.py::test_an_episode_is_counted_once",
+    ),
+    Mutant(
+        "a lead is not paired day by day",
+        "book/own_task/comparing.py",
+        "over(values - theirs)",
+        "over(values - theirs[::-1])",
+        "tests/book/own_task/test_comparing.py::test_leads_are_paired_by_day_and_resampled_by_what_is_random",
+    ),
 )

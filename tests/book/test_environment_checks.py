@@ -141,39 +141,13 @@ def test_the_diagnosis() -> None:
     assert all(name in verdict.message for name in CHECKS)
 
 
-def shares(action: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    unit = 2 * (action - low) / (high - low) - 1
-    return np.array([(unit <= -0.999).mean(0), (unit >= 0.999).mean(0)])
-
-
 def value(gamma: float, steps: int) -> float:
     return (1 - gamma * (1 - gamma**steps) / (steps * (1 - gamma))) / (1 - gamma)
 
 
-@pytest.mark.parametrize(("name", "right"), [("at_bounds", shares), ("value_under_a_clock", value)])
-def test_right_answers_pass_and_none_is_no_failure(name: str, right: Callable) -> None:
-    grader = getattr(graders, name)
-    assert grader(right).passed is True
-    assert grader(lambda *_: ...).passed is None
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda a, lo, hi: np.stack([(a <= lo).mean(0), (a >= hi).mean(0)]), "only exact hits"),
-        (lambda a, lo, hi: np.stack([(a <= lo + 1e-3).mean(0), (a >= hi - 1e-3).mean(0)]), "no units"),
-        (lambda a, lo, hi: shares(a, lo - 1e-3 * (hi - lo) / 2, hi + 1e-3 * (hi - lo) / 2), "only exact"),
-        (lambda a, lo, hi: shares(a, lo, hi).sum(0), "both bounds"),
-        (lambda a, lo, hi: shares(a, lo, hi)[::-1], "changed places"),
-        (lambda a, lo, hi: shares(a, lo, hi).mean(1), "pooled"),
-        (lambda a, lo, hi: shares(a, -np.ones(1), np.ones(1)), "a box of [−1, 1]"),
-        (lambda a, lo, hi: shares(a, lo, hi).T, "some share"),
-    ],
-)
-def test_mistakes_in_saturation_are_named(wrong: Callable, words: str) -> None:
-    verdict = graders.at_bounds(wrong)
-    assert verdict.passed is False
-    assert words in verdict.message
+def test_a_right_value_passes_and_none_is_no_failure() -> None:
+    assert graders.value_under_a_clock(value).passed is True
+    assert graders.value_under_a_clock(lambda *_: ...).passed is None
 
 
 @pytest.mark.parametrize(

@@ -1,111 +1,217 @@
-"""What each detail costs that the source thesis leaves out: the study's fourth arm, a table that fills as cells finish.
+"""What PPO's details change: a detail, its line of code, its measured effects with intervals, from the studies' cells.
 
 ::
 
-    from inbounds.book.ppo_details import what_details_cost
+    from inbounds.book.ppo_details import effect_table, effects
 
-    what_details_cost("../results")
+    effect_table(effects("../results"))
 
-A cell that has not been run says so. The table's plain text is the same whatever is there, so that a stored notebook
-stays a faithful record while the study goes on.
+A detail of which no pair of cells is finished has no row: `not_measured` names it. The table's plain text is the same
+whatever is there, so that a stored notebook stays a faithful record while a study goes on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from inbounds.book import verdicts
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
-from inbounds.study import StudyFolder, analysis
-from inbounds.study.grid import ARMS
+from inbounds.study import StudyFolder, analysis, statistics
+from inbounds.study.cell import ROBOTS, SECOND_VERSION
+from inbounds.study.grid import FREE, all_cells
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second.pooled import pooled_scores
 from inbounds.study.statistics import Estimate
 
-__all__ = ["DETAILS", "CostTable", "what_details_cost"]
+__all__ = ["DETAILS", "Detail", "Effect", "effect_table", "effects", "not_measured", "tally_of"]
 
-DETAILS: Mapping[str, str] = MappingProxyType(
-    {
-        "printed-clip": "clip range 0.02",
-        "printed-observations": "observations not normalised",
-        "printed-advantages": "advantages not normalised",
-        "printed-gradients": "gradients not clipped",
-        "printed-weights": "PyTorch's initial weights",
-        "entropy-0": "no entropy bonus",
-        "entropy-0.001": "entropy coefficient 1e-3",
-        "entropy-0.01": "entropy coefficient 1e-2",
-    }
-)
-"""Variant of the study → what is changed in the preset `common`, and nothing else."""
-
-NOT_RUN, NOT_PLANNED = "not yet run", "–"
+RESAMPLES = 100_000
+FAMILIES = ("gaussian", "clipped-gaussian", "beta", "logit-normal")
+Pairs = tuple[tuple[Column, Column], ...]
 
 
 @dataclass(frozen=True)
-class CostTable:
-    """Changes of the final return, by detail, robot and family; a notebook shows it as a table."""
+class Detail:
+    """One thing that the formula of the clipped surrogate leaves open.
 
-    families: Sequence[str]
-    """The columns."""
-    rows: Mapping[tuple[str, str], Sequence[str]]
-    """Detail, in words, and robot → a cell for each family."""
+    Made in `DETAILS`.
+    """
 
-    def __repr__(self) -> str:
-        return f"<table: {len(self.rows)} rows of detail and robot, {len(self.families)} families>"
-
-    def _repr_html_(self) -> str:
-        html = macros("details")
-        if all(cell in (NOT_RUN, NOT_PLANNED) for cells in self.rows.values() for cell in cells):
-            return str(html.not_run(dict.fromkeys(detail for detail, _ in self.rows)))
-        return str(html.table([LOOKS[family].label for family in self.families], self.rows))
+    line: str
+    """The code that makes the change."""
+    variants: tuple[str, ...] = ()
+    """Of the first study: its cells are compared with those that differ in nothing else."""
+    pairs: Pairs = ()
+    """Of the second study: changed and unchanged column."""
 
 
-def what_details_cost(results: str | Path | Outcomes) -> CostTable:
-    """Return the table of `DETAILS`, on the robots and families on which the study varies them.
+def _second(arm: str, variant: str, gaussian: str = "") -> Pairs:
+    """Return columns of an arm beside those of the equal start, family by family."""
+    return tuple(
+        (Column(arm, "ppo", f, variant), Column("equal", "ppo", f, gaussian if f == "gaussian" else ""))
+        for f in ("gaussian", "beta", "logit-normal")
+    )
+
+
+DETAILS: Mapping[str, Detail] = MappingProxyType(
+    {
+        "start with executed noise 0.4": Detail("PolicyConfig(initial_std=0.4)", ("matched-noise",)),
+        "start with executed noise 0.2 instead of 0.4": Detail(
+            "PolicyConfig(initial_std=0.2)", pairs=_second("noise", "noise-0.2")
+        ),
+        "start with executed noise 0.55 instead of 0.4": Detail(
+            "PolicyConfig(initial_std=0.55)", pairs=_second("noise", "noise-0.55")
+        ),
+        "log σ a free parameter": Detail(
+            "PolicyConfig(state_dependent_std=False)",
+            pairs=tuple(
+                (Column("equal", "ppo", f, FREE), Column("equal", "ppo", f))
+                for f in ("gaussian", "logit-normal")
+            ),
+        ),
+        "clip range 0.02 instead of 0.2": Detail("ratio.clamp(1 - 0.02, 1 + 0.02)", ("printed-clip",)),
+        "no entropy bonus instead of 1e-4": Detail("PPOConfig(entropy_coef=0.0)", ("entropy-0",)),
+        "entropy bonus 1e-3": Detail("PPOConfig(entropy_coef=1e-3)", ("entropy-0.001",)),
+        "entropy bonus 1e-2": Detail("PPOConfig(entropy_coef=1e-2)", ("entropy-0.01",)),
+        "discount 0.9999 instead of 0.99": Detail("PPOConfig(gamma=0.9999)", ("gamma-0.9999",)),
+        "control cost of the drawn action": Detail('TrainConfig(action_mode="raw")', ("raw-cost",)),
+        "Adam's step size 1e-4 instead of 3e-4": Detail(
+            "PPOConfig(learning_rate=1e-4)", pairs=_second("steps", "rate-0.0001", FREE)
+        ),
+        "Adam's step size 1e-3": Detail(
+            "PPOConfig(learning_rate=1e-3)", pairs=_second("steps", "rate-0.001", FREE)
+        ),
+        "observations as they come": Detail("TrainConfig(normalize_obs=False)", ("printed-observations",)),
+        "advantages as they come": Detail("PPOConfig(normalize_advantage=False)", ("printed-advantages",)),
+        "gradients not clipped": Detail("PPOConfig(max_grad_norm=None)", ("printed-gradients",)),
+        "PyTorch's initial weights": Detail('NetworkConfig(initialization="pytorch")', ("printed-weights",)),
+    }
+)
+"""What is changed, and nothing else → the line that does it, and where it is measured."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A measured effect: how far the mean final return moves when one detail is changed.
+
+    Made by `effects`, which has an example.
+    """
+
+    detail: str
+    """A key of `DETAILS`."""
+    robot: str
+    """Where."""
+    policy: str
+    """Whose, in words."""
+    change: Estimate
+    """Changed minus unchanged, with its interval."""
+
+
+def effects(results: str | Path | Outcomes) -> tuple[Effect, ...]:
+    """Return every effect of which both cells are finished, under PPO.
 
     Args:
-        results: the study's folder of results, or what has been read from it.
+        results: the studies' folder of results, or what has been read from it.
 
     Example:
-        >>> table = what_details_cost("no/results")
-        >>> table
-        <table: 16 rows of detail and robot, 3 families>
-        >>> table.rows["clip range 0.02", "Hopper"]
-        ['not yet run', '–', 'not yet run']
+        >>> effects("no/results")
+        ()
     """
-    planned = [cell for cell in ARMS["mechanisms"] if cell.variant in DETAILS]
     if not isinstance(results, Outcomes):
-        compared = {(cell.algorithm, cell.family, cell.robot) for cell in planned}
-        plain = [c for c in ARMS["standard"] if (c.algorithm, c.family, c.robot) in compared]
-        results = Outcomes.read(StudyFolder(Path(results)), [*planned, *plain])
-    families = [family for family in LOOKS if any(cell.family == family for cell in planned)]
-    rows = {
-        (words, robot): [_cell(results, variant, robot, family) for family in families]
-        for variant, words in DETAILS.items()
-        for robot in dict.fromkeys(cell.robot for cell in planned)
-    }
-    return CostTable(families, rows)
+        cells = [cell for cell in all_cells() if cell.algorithm == "ppo"]
+        results = Outcomes.read(StudyFolder(Path(results)), cells)
+    return tuple(effect for name in DETAILS for effect in _effects_of(results, name))
 
 
-def _cell(outcomes: Outcomes, variant: str, robot: str, family: str) -> str:
-    plan = ((c.variant, c.robot, c.family) for c in ARMS["mechanisms"])
-    if (variant, robot, family) not in plan:
-        return NOT_PLANNED
-    outcome = outcomes.find(Column("mechanisms", "ppo", family, variant), robot)
-    change = analysis.change(outcomes, outcome, "final") if outcome else None
-    return spoken(change) if change else NOT_RUN
+def not_measured(found: Sequence[Effect]) -> tuple[str, ...]:
+    """Return the details of which nothing is measured.
+
+    Example:
+        >>> not_measured(()) == tuple(DETAILS)
+        True
+    """
+    measured = {effect.detail for effect in found}
+    return tuple(name for name in DETAILS if name not in measured)
 
 
-def spoken(change: Estimate) -> str:
-    """Say a change with its interval.
+def tally_of(found: Sequence[Effect], detail: str) -> str:
+    """Return on which side of zero the effects of a detail lie.
+
+    Args:
+        found: by `effects`.
+        detail: a key of `DETAILS`.
+    """
+    return verdicts.tally([effect.change for effect in found if effect.detail == detail])
+
+
+def effect_table(found: Sequence[Effect]) -> Shown:
+    """Return the table: a group of rows for each measured detail, its line of code above it.
+
+    Args:
+        found: by `effects`.
+
+    Example:
+        >>> effect_table(())
+        <table: what a change of one detail does to the final return>
+    """
+    groups = [
+        (
+            name,
+            detail.line,
+            tally_of(found, name),
+            [
+                (effect.robot, effect.policy, *told(effect.change))
+                for effect in found
+                if effect.detail == name
+            ],
+        )
+        for name, detail in DETAILS.items()
+        if name not in not_measured(found)
+    ]
+    return Shown(
+        "table: what a change of one detail does to the final return", [macros("details").table(groups)]
+    )
+
+
+def told(change: Estimate) -> tuple[str, str]:
+    """Say a change with its interval, and on which side of zero it lies.
 
     Example:
         >>> import numpy as np
-        >>> spoken(Estimate(np.array(-12.4), np.array(-30.6), np.array(5.0), 10, 0, 0.95, "difference"))
-        '−12 [−31, 5]'
+        >>> told(Estimate(np.array(-12.4), np.array(-30.6), np.array(5.0), 10, 0, 0.95, "difference"))
+        ('−12 [−31, 5]', 'no difference found')
     """
-    value, low, high = (f"{float(x):.0f}".replace("-", "−") for x in (change.value, change.low, change.high))
-    diverged = f", {change.diverged} diverged" if change.diverged else ""
-    return f"{value} [{low}, {high}]{diverged}"
+    number, _, word = verdicts.told(change, digits=0).rpartition(", ")
+    return f"{number}, {change.diverged} diverged" if change.diverged else number, word
+
+
+def _effects_of(outcomes: Outcomes, name: str) -> Iterator[Effect]:
+    detail = DETAILS[name]
+    for variant in detail.variants:
+        for arm in ("mechanisms", "afterwards"):
+            for family in FAMILIES:
+                for robot in ROBOTS:
+                    outcome = outcomes.find(Column(arm, "ppo", family, variant), robot)
+                    change = analysis.change(outcomes, outcome, "final") if outcome else None
+                    if change:
+                        yield Effect(name, robot, LOOKS[family].label, change)
+    for pair in detail.pairs:
+        for robot in ROBOTS:
+            change = _between(outcomes, *pair, robot)
+            if change:
+                free = " with a free σ" if FREE in (pair[0].variant, pair[1].variant) else ""
+                yield Effect(name, robot, LOOKS[pair[0].family].label + free, change)
+
+
+def _between(outcomes: Outcomes, first: Column, second: Column, robot: str) -> Estimate | None:
+    """Return the difference of two columns of the second study, the interval that its pages show."""
+    a, b = (pooled_scores(outcomes, column, robot, "final") for column in (first, second))
+    if a is None or b is None:
+        return None
+    rng = analysis.generator_for("gap", *first, *second, robot, "final", False, version=SECOND_VERSION)
+    return statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")
