@@ -950,4 +950,32 @@ MUTANTS: tuple[Mutant, ...] = (
         "over(values - theirs[::-1])",
         "tests/book/own_task/test_comparing.py::test_leads_are_paired_by_day_and_resampled_by_what_is_random",
     ),
+    Mutant(
+        "a finding does not wait for all of its seeds",
+        "book/report/equal_start.py",
+        "tested = evidence.whole and evidence.p_adjusted < SIGNIFICANCE",
+        "tested = evidence.p_adjusted < SIGNIFICANCE",
+        "tests/book/report/test_equal_start.py::test_grades_of_the_second_study",
+    ),
+    Mutant(
+        "the first study's cell hides the second's",
+        "book/report/equal_start.py",
+        "rows.append(found or _of_first_study(outcomes, algorithm, law, robot, endpoint))",
+        "rows.append(_of_first_study(outcomes, algorithm, law, robot, endpoint) or found)",
+        "tests/book/report/test_equal_start.py::test_the_grade_changes_as_cells_arrive",
+    ),
+    Mutant(
+        "a law that loses somewhere leads",
+        "book/report/answers.py",
+        "if 1 in found and -1 not in found}",
+        "if 1 in found}",
+        "tests/book/report/test_equal_start.py::test_the_first_choice_follows_from_the_numbers",
+    ),
+    Mutant(
+        "no finding is fragile",
+        "book/report/as_they_come.py",
+        "return self.found and not self.p_over_all < SIGNIFICANCE",
+        "return self.found and self.p_over_all < 0",
+        "tests/book/report/test_as_they_come.py::test_found_fragile_changed",
+    ),
 )

@@ -40,13 +40,6 @@ CHAPTERS = [
 ]
 """Chapters of the first edition; what rewritten chapters and depth pages owe their reader is in test_anatomy."""
 
-STUDY_CHAPTERS = {
-    # They read what was measured and state no theorem of their own; all else a chapter owes its reader they owe too.
-    "one_thing_at_a_time",
-    "inside_the_policies",
-}
-
-
 ANATOMY = (
     "## Objectives",
     "{admonition} Predict",
@@ -95,8 +88,6 @@ def test_anatomy(path: Path) -> None:
         cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown"
     )
     for part in ANATOMY:
-        if part == "{prf:" and path.stem in STUDY_CHAPTERS:
-            continue
         assert part in prose, part
 
 

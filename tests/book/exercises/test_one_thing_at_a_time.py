@@ -1,17 +1,10 @@
-"""The graders of the mechanisms pass right answers, and name the known mistakes."""
+"""The grader of the horizon passes right answers, and names the known mistakes."""
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
-from scipy import optimize
 
 from inbounds.book.exercises import one_thing_at_a_time as graders
-from inbounds.learning import executed_std
-
-
-def by_the_package(std: float) -> float:
-    return float(optimize.brentq(lambda s: executed_std("gaussian", s) - std, 1e-3, 100, xtol=1e-12))
 
 
 def geometric(gamma: float, horizon: int) -> float:
@@ -20,7 +13,7 @@ def geometric(gamma: float, horizon: int) -> float:
 
 @pytest.mark.parametrize(
     ("grader", "right"),
-    [(graders.matched_scale, by_the_package), (graders.share_seen, geometric)],
+    [(graders.share_seen, geometric)],
 )
 def test_right_answers_pass(grader: Callable, right: Callable) -> None:
     assert grader(right).passed is True, grader(right)
@@ -30,13 +23,6 @@ def test_right_answers_pass(grader: Callable, right: Callable) -> None:
 @pytest.mark.parametrize(
     ("grader", "wrong", "words"),
     [
-        (graders.matched_scale, lambda s: s, "before clipping"),
-        (graders.matched_scale, lambda s: by_the_package(s) * 1.01, "counts as 1"),
-        (
-            graders.matched_scale,
-            lambda s: by_the_package(s) if s < 0.5 else 1.1,
-            "default of a Gaussian",
-        ),
         (graders.share_seen, lambda g, t: (1 - g ** (t + 1)) / (1 - g), "one term too many, and"),
         (graders.share_seen, lambda g, t: (1 - g ** (t + 1)) / (1 - g) / t, "γ⁰ to γ^(T−1)"),
         (graders.share_seen, lambda g, t: (1 - g**t) / (1 - g), "it is a share"),
@@ -48,9 +34,3 @@ def test_known_mistakes_are_named(grader: Callable, wrong: Callable, words: str)
     verdict = grader(wrong)
     assert verdict.passed is False
     assert words in verdict.message, verdict
-
-
-def test_a_truncated_gaussian_is_told_from_a_clipped_one() -> None:
-    truncated = graders._scale_for(graders._truncated_std, 0.4)
-    verdict = graders.matched_scale(lambda std: truncated if np.isclose(std, 0.4) else by_the_package(std))
-    assert "cut off" in verdict.message

@@ -131,6 +131,25 @@ def by_endpoint(rows: Sequence[Evidence], algorithm: str) -> Shown:
     )
 
 
+def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
+    """Return a forest of a Gaussian that starts quietly minus one as it comes, a panel an endpoint.
+
+    Args:
+        rows: of `equal_start.quiet_starts`.
+        algorithm: ppo or trpo.
+    """
+    here = of(rows, algorithm=algorithm)
+    what = f"a quiet start, {algorithm.upper()}"
+    panels = {name: bars(of(here, endpoint=e)) for e, name in ENDPOINTS.items()}
+    if not here:
+        return html.of_study(what, html.NONE_FINISHED)
+    alt = f"Quiet minus plain Gaussian with 95 percent intervals. {in_words(panels)}"
+    fig = forest(panels, xlabel=MARGINS_AS_UNIT, order=ROBOTS)
+    lacking = [robot for robot in ROBOTS if not of(here, robot=robot)]
+    strip = [html.missing(f"Not run: {', '.join(lacking)}.")] if lacking else []
+    return html.of_study(what, html.figure(fig, alt, _caption({algorithm: here})), *strip)
+
+
 def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
     drawn = {title: bars(rows) for title, rows in panels.items() if rows}
     if not drawn:

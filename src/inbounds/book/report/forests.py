@@ -56,6 +56,9 @@ SERIES: Mapping[str, Series] = MappingProxyType(
         ),
         "logit-normal, beta": Series("Logit-normal − Beta", SHADES[2], "v"),
         "logit-normal, clipped-gaussian": Series("Logit-normal − CAPG", SHADES[1], "P"),
+        "as they come": Series("as they come", SHADES[0], "s"),
+        "both quiet": Series("both quiet", SHADES[3], "X"),
+        "both loud": Series("both loud", SHADES[1], "D"),
     }
 )
 """The differences that the book's forests show, by name."""

@@ -5,11 +5,9 @@ Exact numbers are errors of computing; those that depend on drawn seeds come wit
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import time
 from collections.abc import Callable, Sequence
-from typing import Literal
 
 import numpy as np
 import torch
@@ -22,6 +20,7 @@ from inbounds.learning.training import one_thread
 from inbounds.study.analysis import generator_for
 from inbounds.study.ledger.evidence import combination, side
 from inbounds.study.ledger.half_of_a_gap import half_left
+from inbounds.study.ledger.untrained_returns import LOUD, untrained
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Floats, Outcomes
 from inbounds.study.statistics import Estimate
@@ -118,33 +117,6 @@ def _law(loc: float, scale: float) -> LogitNormal:
     return LogitNormal(
         torch.tensor(loc, dtype=torch.float64), torch.tensor(scale, dtype=torch.float64), 0.0, 1.0
     )
-
-
-LOUD = 0.7
-"""Executed standard deviation, in half ranges: near a Gaussian's default, and near the most a logit-normal can have."""
-
-
-@functools.cache
-def untrained(
-    family: str, robot: str, std: float | None = None, mode: Literal["clip", "raw"] = "clip"
-) -> Floats:
-    """Return the mean return of each of ten untrained policies in a thousand steps, preset `common`, `[S]`.
-
-    Args:
-        family: of the policies.
-        robot: its name, as in `inbounds.study.grid.ROBOTS`.
-        std: executed noise, in half ranges; None is the family's default.
-        mode: whether the action is clipped before the robot and its reward see it.
-
-    Example:
-        >>> untrained("beta", "Swimmer").shape
-        (10,)
-    """
-    config = preset("common", f"{robot}-v5", policy=family, epochs=1)
-    policy = dataclasses.replace(config.policy, initial_std=std)
-    config = dataclasses.replace(config, policy=policy, action_mode=mode)
-    with one_thread():
-        return np.array([np.mean(ended) for ended in Trainer(config).collector.collect(1000).episode_returns])
 
 
 def loud_starts(robots: Sequence[str]) -> Evidence:

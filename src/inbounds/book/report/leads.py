@@ -1,0 +1,133 @@
+"""What is left of a bounded law's lead once both sides start alike: as they come, both quiet, both loud.
+
+show = leads(outcomes_of_both(study_pages.shipped()))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from inbounds.book.report import html
+from inbounds.book.report.as_they_come import compared
+from inbounds.book.report.equal_start import laws
+from inbounds.book.report.forests import MARGINS_AS_UNIT, Bar, forest, in_words
+from inbounds.book.report.html import Shown
+from inbounds.book.report.study_figures import SHORT
+from inbounds.study import statistics
+from inbounds.study.analysis import generator_for, marked, scores
+from inbounds.study.grid import ROBOTS
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second import MARGINS
+from inbounds.study.second.primary import RESAMPLES
+from inbounds.study.second.yardsticks import ENDPOINTS
+from inbounds.study.statistics import Estimate
+
+
+@dataclass(frozen=True)
+class Lead:
+    """A law's lead over the Gaussian on a robot, from one kind of start.
+
+    Made by `leads_of`, which has an example.
+    """
+
+    robot: str
+    algorithm: str
+    law: str
+    endpoint: str
+    start: str
+    """as they come, both quiet or both loud."""
+    difference: Estimate
+    """Law minus Gaussian."""
+
+    @property
+    def place(self) -> str:
+        """What its group of bars is called."""
+        return f"{self.robot}, {self.algorithm.upper()},\n{SHORT[self.law]}"
+
+
+def leads_of(outcomes: Outcomes) -> list[Lead]:
+    """Return the leads of final returns that are found as the families come, and what other starts leave of them.
+
+    Args:
+        outcomes: of both studies, as `equal_start.outcomes_of_both` returns them.
+
+    Returns:
+        Both endpoints of each; a start of which there is no experiment is left out.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.book.report.equal_start import outcomes_of_both
+        >>> from inbounds.study import StudyFolder
+        >>> leads_of(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))))
+        []
+    """
+    rows = [row for arm in ("standard", "beyond") for row in compared(outcomes, arm)]
+    rows = [row for row in rows if row.contrast.second == "gaussian"]
+    found = {
+        (row.robot, row.contrast.algorithm, row.contrast.first)
+        for row in rows
+        if row.endpoint == "final" and row.word == "higher"
+    }
+    plain = [
+        Lead(
+            row.robot,
+            row.contrast.algorithm,
+            row.contrast.first,
+            row.endpoint,
+            "as they come",
+            row.difference,
+        )
+        for row in rows
+    ]
+    quiet = [
+        Lead(row.robot, row.algorithm, row.law, row.endpoint, "both quiet", row.difference)
+        for row in laws(outcomes)
+    ]
+    every = [*plain, *quiet, *_loud(outcomes)]
+    return [each for each in every if (each.robot, each.algorithm, each.law) in found]
+
+
+def _loud(outcomes: Outcomes) -> list[Lead]:
+    """Return a logit-normal that starts loud minus the Gaussian as it comes, which is as loud."""
+    leads = []
+    for robot in ROBOTS:
+        loud = outcomes.find(Column("afterwards", "trpo", "logit-normal", "loud-noise"), robot)
+        gaussian = outcomes.find(Column("standard", "trpo", "gaussian"), robot)
+        if loud is None or gaussian is None:
+            continue
+        for endpoint in ENDPOINTS:
+            rng = generator_for("both loud", robot, endpoint)
+            first, second = (scores(each, endpoint) for each in (loud, gaussian))
+            found = statistics.difference(
+                first, second, rng, statistic="mean", resamples=RESAMPLES, missing="exclude"
+            )
+            leads.append(
+                Lead(robot, "trpo", "logit-normal", endpoint, "both loud", marked(found, loud, gaussian))
+            )
+    return leads
+
+
+def leads(outcomes: Outcomes) -> Shown:
+    """Return a forest of what each kind of start leaves of a lead, a panel an endpoint."""
+    what = "what is left of a lead"
+    found = sorted(leads_of(outcomes), key=lambda lead: (ROBOTS.index(lead.robot), lead.algorithm, lead.law))
+    if not found:
+        return html.of_study(what, html.NONE_FINISHED)
+    panels = {name: _bars(found, endpoint) for endpoint, name in ENDPOINTS.items()}
+    alt = f"Law minus Gaussian with 95 percent intervals, by the kind of start. {in_words(panels)}"
+    caption = (
+        "Law minus Gaussian, where that is found above 0 as the families come. Bars: 95 % bootstrap intervals, not "
+        "corrected. Both quiet: executed noise 0.4 before training; on some robots only the Gaussian was made quiet, "
+        "the law being nearly so as it comes. Both loud: the logit-normal executes 0.7, the Gaussian 0.72. Grey: too "
+        "small to choose by. A bar that is not there is an experiment that nobody has run."
+    )
+    return html.of_study(what, html.figure(forest(panels, xlabel=MARGINS_AS_UNIT), alt, caption))
+
+
+def _bars(found: Sequence[Lead], endpoint: str) -> list[Bar]:
+    return [
+        Bar(lead.place, lead.start, lead.difference, MARGINS[endpoint][lead.robot])
+        for lead in found
+        if lead.endpoint == endpoint
+    ]
