@@ -107,6 +107,13 @@ def test_what_was_not_trained_is_refused(robot: str, left: str) -> None:
         live_robot(VideoRow([]), robot, left)
 
 
+def test_a_way_to_act_must_be_the_family_s() -> None:
+    element = live_robot(VideoRow([]), "Ant", "ppo-beta", "ppo-beta", ways=("median", "mode"))
+    assert 'data-ways="median mode"' in element._repr_html_()
+    with pytest.raises(ValueError, match=r"gaussian acts by median, sample, .* not by 'mode'"):
+        live_robot(VideoRow([]), "Ant", "ppo-gaussian", "ppo-beta", ways=("mode", "mode"))
+
+
 def test_without_npm_there_is_a_line_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def unreachable() -> Path:
         raise site.NpmError("npm could not bring the packages: no network")

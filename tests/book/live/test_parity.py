@@ -49,7 +49,7 @@ def worst(told: list[dict[str, Any]], recorded: list[dict[str, Any]]) -> dict[st
     return {"obs": off("obs"), "reward": off("reward"), "action": action}
 
 
-@pytest.mark.parametrize("family", ["gaussian", "logit-normal"])
+@pytest.mark.parametrize("family", [pytest.param("gaussian", marks=pytest.mark.slow), "logit-normal"])
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_step_is_the_same(engine: None, robot: str, family: str) -> None:
     (cell,) = select([f"standard-{robot.lower()}-ppo-{family}"])

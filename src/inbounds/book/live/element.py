@@ -11,6 +11,7 @@ from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.live.export import NAMES
 from inbounds.book.templates import macros
 from inbounds.study.grid import ROBOTS, THESIS
+from inbounds.study.ways_played import ways_of
 
 _HERE = Path(__file__).parent
 _COLORS = {
@@ -44,6 +45,8 @@ class LiveRobot:
     """What moves the second; empty for none."""
     seed: int
     """With which they were trained."""
+    ways: tuple[str, str] = ("sample", "sample")
+    """By what the first and the second act at the beginning, as in `inbounds.study.ways_played`."""
 
     def __repr__(self) -> str:
         """Return a line that never changes."""
@@ -52,7 +55,13 @@ class LiveRobot:
     def _repr_html_(self) -> str:
         return str(
             macros("live").robot(
-                self.films._repr_html_(), self.robot, self.left, self.right, self.seed, style_sheet()
+                self.films._repr_html_(),
+                self.robot,
+                self.left,
+                self.right,
+                self.seed,
+                self.ways,
+                style_sheet(),
             )
         )
 
@@ -63,6 +72,7 @@ def live_robot(
     left: str = "ppo-gaussian",
     right: str = "ppo-logit-normal",
     seed: int = 0,
+    ways: tuple[str, str] = ("sample", "sample"),
 ) -> LiveRobot:
     """Return an element for a page; in the built book it has a button that starts the robots.
 
@@ -72,9 +82,11 @@ def live_robot(
         left: what moves the first robot: algorithm and family, as in `POLICIES`.
         right: what moves the second; empty for none.
         seed: with which both were trained, 0 to 9.
+        ways: by what the first and the second act until the reader chooses: sample, mean, median, mode,
+            median-snapped or sample-snapped, as the family has it.
 
     Raises:
-        ValueError: there is no such robot, or no such policy.
+        ValueError: there is no such robot, no such policy, or no such way to act.
 
     Example:
         >>> from inbounds.book.drawing.videos import VideoRow
@@ -86,7 +98,11 @@ def live_robot(
     for policy in (left, right or left):
         if policy not in POLICIES:
             raise ValueError(f"no policy {policy!r} was trained; there are {', '.join(POLICIES)}")
-    return LiveRobot(films, robot, left, right, seed)
+    for policy, way in zip((left, right or left), ways, strict=True):
+        family = policy.partition("-")[2]
+        if way not in ways_of(family):
+            raise ValueError(f"{family} acts by {', '.join(ways_of(family))}, not by {way!r}")
+    return LiveRobot(films, robot, left, right, seed, ways)
 
 
 @functools.cache

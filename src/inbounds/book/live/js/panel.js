@@ -10,8 +10,8 @@ inbounds.live.Panel = class {
     beyond: "Draws outside the box",
   };
 
-  // show: the inbounds.live.Show it belongs to; policy: of the catalogue, such as ppo-gaussian, or "" for none.
-  constructor(show, title, policy) {
+  // show: the inbounds.live.Show it belongs to; policy: of the catalogue, such as ppo-gaussian, or "" for none; way: to act.
+  constructor(show, title, policy, way) {
     const { make, choice, slider, button } = inbounds.live.dom;
     this.show = show;
     this.title = title;
@@ -21,7 +21,7 @@ inbounds.live.Panel = class {
       this.policy = value;
       restart();
     });
-    this.way = choice("acts by", {}, "sample", (value) => this.player && (this.player.way = value));
+    this.way = choice("acts by", { [way]: "" }, way, (value) => this.player && (this.player.way = value));
     this.spread = slider(
       "noise ×",
       { min: 0, max: 3, step: 0.05, value: 1, text: (x) => x.toFixed(2) },

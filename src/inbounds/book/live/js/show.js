@@ -25,10 +25,13 @@ inbounds.live.Show = class {
 
   constructor(element, mujoco) {
     const { robot, left, right, seed } = element.dataset;
+    const ways = element.dataset.ways.split(" ");
     Object.assign(this, { element, mujoco, robot, seed: Number(seed), untrained: false, rate: 1, start: 0, owed: 0 });
     this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.visible = true;
-    this.panels = [new inbounds.live.Panel(this, "First robot", left), new inbounds.live.Panel(this, "Second robot", right)];
+    this.panels = [["First robot", left], ["Second robot", right]].map(
+      ([title, policy], i) => new inbounds.live.Panel(this, title, policy, ways[i]),
+    );
     this.build();
   }
 
