@@ -124,7 +124,7 @@ inbounds.live.Panel = class {
     const texts = {
       total: now.total.toFixed(0),
       speed: `${now.speed.toFixed(1)} m/s`,
-      seconds: `${now.seconds.toFixed(1)} s`,
+      seconds: `${now.seconds.toFixed(2)} s`,
       atBounds: percent(now.atBounds),
       beyond: percent(now.beyond),
     };
