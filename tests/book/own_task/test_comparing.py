@@ -4,21 +4,22 @@ import numpy as np
 import pytest
 
 from inbounds.book.own_task import best_of, compare, constant, play
+from inbounds.book.own_task.greenhouse import GreenhouseBatch
 from tests.learning.point import PointEnv
 
 
 def test_an_episode_is_counted_once() -> None:
-    """A finished episode earns no more, though its environment goes on."""
-    envs = PointEnv(3)
-    envs.reset(seed=[4, 5, 6])
-    action = np.tile(np.float32([0.2] * envs.single_action_space.shape[0]), (3, 1))
-    expected, running = np.zeros(3), np.ones(3, bool)
-    while running.any():
-        _, reward, terminated, truncated, _ = envs.step(action)
+    """A finished episode earns no more, though its environment goes on; these end after different times."""
+    days, freeze = [4, 5, 6], np.float32([-2, 1])
+    envs, expected, running, lengths = GreenhouseBatch(3), np.zeros(3), np.ones(3, bool), set()
+    envs.reset(seed=days)
+    for step in range(200):
+        _, reward, terminated, truncated, _ = envs.step(np.tile(freeze, (3, 1)))
         expected[running] += reward[running]
+        lengths |= {step} if (running & (terminated | truncated)).any() else set()
         running &= ~(terminated | truncated)
-    found = play(constant(action[0]), PointEnv, [4, 5, 6])
-    np.testing.assert_allclose(found, expected)
+    assert len(lengths) > 1
+    np.testing.assert_allclose(play(constant(freeze), GreenhouseBatch, days), expected)
 
 
 def test_an_episode_without_end_is_refused() -> None:

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from inbounds.book.environment_checks import complaints
 from inbounds.book.own_task import constant, greedy, greenhouse_runs, play
 from inbounds.book.own_task import greenhouse as house
+from inbounds.learning import Trainer
 from inbounds.learning.seeding import SeedStreams
 
 
@@ -82,6 +83,16 @@ def test_what_is_shipped_plays_what_is_shipped() -> None:
         again = play(greedy(policies[7]), house.GreenhouseBatch, days)
         np.testing.assert_allclose(again, returns[family, "greedy"][7, :20], atol=0.01)
         assert policies[7].config == greenhouse_runs.plan(family)
+
+
+def test_the_first_epochs_are_trained_again() -> None:
+    """The shipped curves are those of this code and this plan, up to another processor's rounding."""
+    curves = greenhouse_runs.read_curves()["logit-normal"]
+    trainer = Trainer(greenhouse_runs.plan("logit-normal"), house.GreenhouseBatch)
+    for epoch in range(2):
+        record = trainer.epoch()
+        for name in ("return_mean", "kl", "saturation", "explained_variance"):
+            np.testing.assert_allclose(record[name], curves[name][:, epoch], rtol=1e-2, atol=1e-3)
 
 
 def test_no_day_serves_twice() -> None:
