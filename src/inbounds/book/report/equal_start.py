@@ -89,7 +89,7 @@ def grade(evidence: Evidence) -> Grade:
     Example:
         >>> import dataclasses
         >>> import numpy as np
-        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(999.0), 10, 0, 0.95, "difference of means")
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
         >>> first = Evidence("Ant", "ppo", "beta", "final", ahead, study=1, p_adjusted=0.01)
         >>> grade(first), grade(dataclasses.replace(first, study=2)), grade(dataclasses.replace(first, whole=False))
         ('found', 'found with fresh seeds', 'suggested')
