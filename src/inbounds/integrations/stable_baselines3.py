@@ -166,7 +166,7 @@ def quiet_start(model: Model, std: float = 0.4) -> Model:
         >>> from stable_baselines3 import PPO
         >>> model = quiet_start(PPO("MlpPolicy", "Pendulum-v1", n_steps=64, device="cpu", seed=0))
         >>> round(model.policy.log_std.exp().item(), 3)  # N·m, of a box of ±2: 0.4 of half the range, when clipped
-        0.821
+        0.81
     """
     policy: Any = model.policy
     kind = type(getattr(policy, "action_dist", policy))
