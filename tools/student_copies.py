@@ -7,6 +7,9 @@ place; here it is left out, prose and cells alike, from `{solution-start}` to `{
 cell with the tag `solution`. JupyterLab does not know the role that shows a glued number; in a copy the number itself
 stands there, as the book has it. The book's download button hands out the same copies (`tools/build_book.py`).
 
+With the chapters go the build notebooks of `tools/build`: blanks for functions of the growing program, each with a
+grader right after it, and the program around them.
+
 A copy that a student has changed is never overwritten.
 """
 
@@ -136,7 +139,7 @@ def chapters_in_order(toc: Path = ROOT / "_toc.yml") -> dict[str, Path]:
     """Return the notebooks as a class reads them, and the book's notebook of each.
 
     Core chapters are numbered, `01_actions_have_bounds.ipynb` and so on; the pages of *Going deeper* follow them as
-    `deeper_NAME.ipynb`.
+    `deeper_NAME.ipynb`, and the build notebooks, in which a program's functions are blanks, as `build_NAME.ipynb`.
 
     Args:
         toc: the book's table of contents, at its root. A file has no number of its own there: chapters move.
@@ -144,7 +147,9 @@ def chapters_in_order(toc: Path = ROOT / "_toc.yml") -> dict[str, Path]:
     pages, folder = contents(toc), toc.parent / "notebooks"
     copies = {f"{number:02}_{name}.ipynb": name for number, name in enumerate(pages.core, 1)}
     copies |= {f"deeper_{name}.ipynb": name for name in pages.depth}
-    return {copied: folder / f"{name}.ipynb" for copied, name in copies.items()}
+    found = {copied: folder / f"{name}.ipynb" for copied, name in copies.items()}
+    build = sorted((toc.parent / "tools" / "build").glob("*.ipynb"))
+    return found | {f"build_{path.name}": path for path in build}
 
 
 def hand_out(chapters: Mapping[str, Path], folder: Path) -> dict[str, str]:

@@ -16,6 +16,7 @@ from inbounds.book import exercises
 from inbounds.book.exercises.judging import Judgement
 from tests.book.exercises import (
     test_actions_have_bounds,
+    test_advantages_of_actions,
     test_bang_bang,
     test_beta_policies,
     test_beta_spread_and_region,
@@ -27,6 +28,7 @@ from tests.book.exercises import (
     test_kl_invariance,
     test_logit_normal_density,
     test_logit_normal_moments,
+    test_many_steps_from_one_batch,
     test_other_libraries,
     test_policy_that_learns,
     test_six_untrained_robots,
@@ -50,6 +52,8 @@ RIGHT = [
     pytest.param(getattr(importlib.import_module(f"{exercises.__name__}.{chapter}"), name), right, id=name)
     for chapter, answers in {
         "actions_have_bounds": test_actions_have_bounds.RIGHT,
+        "advantages_of_actions": test_advantages_of_actions.RIGHT,
+        "many_steps_from_one_batch": test_many_steps_from_one_batch.RIGHT,
         "bang_bang": test_bang_bang.RIGHT,
         "beta_policies": test_beta_policies.RIGHT,
         "beta_spread_and_region": test_beta_spread_and_region.RIGHT,

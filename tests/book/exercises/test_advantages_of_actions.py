@@ -1,4 +1,4 @@
-"""The graders of the policy gradient pass the right answers and name the known mistakes."""
+"""The graders of advantages pass the right answers and name the known mistakes."""
 
 from collections.abc import Callable
 
@@ -6,39 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from inbounds.book.exercises import policy_gradient as graders
+from inbounds.book.exercises import advantages_of_actions as graders
 from inbounds.learning import gae
-
-
-def leave_one_out(latent, returns, loc, log_scale, baseline=None):
-    """Draw by draw, by autograd."""
-    total = np.zeros(2)
-    for i in range(len(returns)):
-        parameters = torch.tensor([loc, log_scale], dtype=torch.float64, requires_grad=True)
-        law = torch.distributions.Normal(parameters[0], parameters[1].exp())
-        log_prob = law.log_prob(torch.tensor(latent[i], dtype=torch.float64))
-        (score,) = torch.autograd.grad(log_prob, parameters)
-        others = np.delete(returns, i).mean() if baseline is None else baseline(returns)
-        total += score.numpy() * (returns[i] - others)
-    return total / len(returns)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda *a: leave_one_out(*a, baseline=np.mean), "leave its own out"),
-        (lambda *a: leave_one_out(*a, baseline=lambda r: 0.0), "baseline is missing"),
-        (lambda *a: leave_one_out(*a) * len(a[1]), "take their mean"),
-        (lambda *a: leave_one_out(*a) / [1, np.exp(a[3])], "derivative in σ"),
-        (lambda *a: leave_one_out(*a) * [np.exp(a[3]), 1], "factor 1/σ"),
-        (lambda *a: -leave_one_out(*a), "sign is wrong"),
-        (lambda *a: leave_one_out(*a) + 1, "the value is wrong"),
-    ],
-)
-def test_leave_one_out_mistakes(wrong: Callable, words: str) -> None:
-    verdict = graders.leave_one_out_gradient(wrong)
-    assert verdict.passed is False
-    assert words in verdict.message
 
 
 def by_gae(reward, next_value, terminated, truncated, gamma, lam):
@@ -66,12 +35,10 @@ def recursion(reward, next_value, terminated, truncated, gamma, lam, *, cut=True
 @pytest.mark.parametrize("right", [by_gae, recursion])
 def test_right_answers_pass(right: Callable) -> None:
     assert graders.lambda_returns(right).passed is True
-    assert graders.leave_one_out_gradient(leave_one_out).passed is True
 
 
 def test_unanswered_exercises_are_no_failures() -> None:
     assert graders.lambda_returns(lambda *_: ...).passed is None
-    assert graders.leave_one_out_gradient(lambda *_: ...).passed is None
 
 
 def printed(reward, next_value, terminated, truncated, gamma, lam):
@@ -110,3 +77,57 @@ def test_lambda_return_mistakes(wrong: Callable, words: str) -> None:
     verdict = graders.lambda_returns(wrong)
     assert verdict.passed is False
     assert words in verdict.message
+
+
+def growing(batch, critic, gamma=0.99, lam=0.95, *, ends=1.0, cuts=0.0, stop=(1, 1), weight=None, plus=1.0):
+    """The growing program's, with its mistakes on demand."""
+    value, after = critic(batch.obs).detach(), critic(batch.next_obs).detach()
+    alive = 1 - ends * batch.terminated - cuts * batch.truncated
+    residual = batch.reward + gamma * alive * after - value
+    keep = (gamma * lam if weight is None else weight(gamma, lam)) * (1 - stop[0] * batch.terminated)
+    keep = keep * (1 - stop[1] * batch.truncated)
+    advantage, later = torch.zeros_like(value), 0
+    for t in reversed(range(len(value))):
+        advantage[t] = later = residual[t] + keep[t] * later
+    return advantage, advantage + plus * value
+
+
+RIGHT = {
+    "advantages": growing,
+    "half_life": lambda gamma: np.log(0.5) / np.log(gamma),
+    "lambda_returns": by_gae,
+}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda *a: growing(*a, cuts=1.0), "a truncated step counts as an end"),
+        (lambda *a: growing(*a, ends=0.0), "multiply the next value by 1 − terminated"),
+        (lambda *a: growing(*a, stop=(0, 0)), "stop at terminated and at truncated"),
+        (lambda *a: growing(*a, stop=(1, 0)), "stop at truncated steps as well"),
+        (lambda *a: growing(*a, weight=lambda gamma, lam: lam), "not λ^l"),
+        (lambda *a: growing(*a, weight=lambda gamma, lam: 0.0), "residuals alone"),
+        (lambda *a: growing(*a)[0], "return two things"),
+        (lambda *a: growing(*a, plus=-1.0), "*plus* the value"),
+        (lambda *a: tuple(1 + x for x in growing(*a)), "the value is wrong"),
+        (lambda batch, critic, gamma, lam: batch.rewards, "AttributeError"),
+    ],
+)
+def test_mistakes_of_the_growing_program(wrong: Callable, words: str) -> None:
+    verdict = graders.advantages(wrong)
+    assert verdict.passed is False
+    assert words in verdict.message
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda g: np.log(2) / np.log(g), "sign"),
+        (lambda g: g / 2, "logarithms"),
+        (lambda g: 1 / (1 - g), "not the half-life"),
+        (lambda g: np.log(g) / np.log(0.5), "swapped"),
+    ],
+)
+def test_mistakes_of_the_half_life(wrong: Callable, words: str) -> None:
+    assert words in graders.half_life(wrong).message

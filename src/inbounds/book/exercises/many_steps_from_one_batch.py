@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import torch
 from scipy.special import logsumexp
 
 from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
-__all__ = ["effective_sample_size", "surrogate_of"]
+__all__ = ["effective_sample_size", "surrogate", "surrogate_of"]
 
 
 def effective_sample_size(function: Callable[..., Any]) -> Judgement:
@@ -48,6 +51,50 @@ def effective_sample_size(function: Callable[..., Any]) -> Judgement:
         case(np.array([0.0, -3.0, 900.0]), hint=overflow),
     ]
     return judge_cases(function, cases, "right, for any size of the ratios")
+
+
+def surrogate(function: Callable[..., Any]) -> Judgement:
+    """The growing program's `surrogate`: its value, and the gradient that reaches the policy."""
+    rng = np.random.default_rng(0)
+
+    @functools.wraps(function)
+    def value_and_slope(
+        shift: float, log_prob: torch.Tensor, old: torch.Tensor, advantage: torch.Tensor
+    ) -> Any:
+        at = torch.tensor(shift, dtype=torch.float64, requires_grad=True)
+        policy = SimpleNamespace(log_prob=lambda obs, latent: log_prob + at * torch.arange(len(log_prob)))
+        batch = SimpleNamespace(obs=None, latent=None)
+        found = function(policy, batch, advantage, old)
+        if not isinstance(found, torch.Tensor) or found.ndim:
+            return found
+        slope = torch.autograd.grad(found, at, allow_unused=True)[0] if found.requires_grad else None
+        return [float(found.detach()), 0.0 if slope is None else float(slope)]
+
+    def case(steps: int) -> Case:
+        log_prob, old, advantage = rng.normal(size=(3, steps))
+        step, shift = np.arange(steps), 0.1
+        ratio = np.exp(log_prob + shift * step - old)
+
+        def both(weight: np.ndarray, slope: np.ndarray) -> list[float]:
+            return [float(np.mean(weight * advantage)), float(np.mean(slope * advantage))]
+
+        right = both(ratio, ratio * step)
+        mistakes = {
+            "no gradient reaches the policy: nothing of the new log-probability may be detached": [
+                right[0],
+                0.0,
+            ],
+            "the log-ratio is not exponentiated": both(np.log(ratio), step),
+            "old and new are swapped": both(1 / ratio, -step / ratio),
+            "the sign is wrong: this is to be ascended": [-x for x in right],
+            "that is the sum over the batch: take its mean": [steps * x for x in right],
+            "return one number: the mean over the batch": ratio * advantage,
+            "that is the objective of REINFORCE, without a ratio": both(log_prob + shift * step, step),
+        }
+        arguments = (shift, *map(torch.from_numpy, (log_prob, old, advantage)))
+        return Case(arguments, right, mistakes)
+
+    return judge_cases(value_and_slope, [case(5), case(40)], "right: ratio times advantage, averaged")
 
 
 def surrogate_of(function: Callable[..., Any]) -> Judgement:

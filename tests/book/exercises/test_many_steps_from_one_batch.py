@@ -7,7 +7,7 @@ import pytest
 import torch
 from scipy import stats
 
-from inbounds.book.exercises import surrogate as graders
+from inbounds.book.exercises import many_steps_from_one_batch as graders
 
 
 def stable(log_ratio):
@@ -97,3 +97,39 @@ def test_surrogate_mistakes(wrong: Callable, words: str) -> None:
     verdict = graders.surrogate_of(wrong)
     assert verdict.passed is False
     assert words in verdict.message
+
+
+def growing(policy, batch, advantage, old_log_prob):
+    return ((policy.log_prob(batch.obs, batch.latent) - old_log_prob).exp() * advantage).mean()
+
+
+def log_prob_of(policy, batch):
+    return policy.log_prob(batch.obs, batch.latent)
+
+
+RIGHT = {"effective_sample_size": stable, "surrogate_of": right}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda p, b, a, old: growing(p, b, a, old).detach(), "no gradient reaches"),
+        (lambda p, b, a, old: ((log_prob_of(p, b) - old) * a).mean(), "not exponentiated"),
+        (lambda p, b, a, old: ((old - log_prob_of(p, b)).exp() * a).mean(), "swapped"),
+        (lambda *x: -growing(*x), "to be ascended"),
+        (lambda p, b, a, old: growing(p, b, a, old) * len(a), "take its mean"),
+        (lambda p, b, a, old: (log_prob_of(p, b) - old).exp() * a, "return one number"),
+        (lambda p, b, a, old: (log_prob_of(p, b) * a).mean(), "without a ratio"),
+        (lambda *x: growing(*x) + 1, "the value is wrong"),
+        (lambda p, b, a, old: p.log_probs, "AttributeError"),
+    ],
+)
+def test_mistakes_of_the_growing_program(wrong: Callable, words: str) -> None:
+    verdict = graders.surrogate(wrong)
+    assert verdict.passed is False
+    assert words in verdict.message
+
+
+def test_the_growing_program_s_surrogate_passes() -> None:
+    assert graders.surrogate(growing).passed is True
+    assert graders.surrogate(lambda *_: ...).passed is None
