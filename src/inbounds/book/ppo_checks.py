@@ -8,48 +8,55 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from types import MappingProxyType, SimpleNamespace
-from typing import NamedTuple, TypeAlias
+from types import MappingProxyType
+from typing import TypeAlias
 
 import torch
 from torch import Tensor, nn
 
+from inbounds.book.small_updates import Batch
 from inbounds.learning.families import NORMAL, Limits
 from inbounds.learning.families.gaussian import normal_entropy
 
-__all__ = ["CHECKS", "GAUSSIAN", "Loss", "Scene", "SceneLaw", "policy_loss"]
+__all__ = ["CHECKS", "Loss", "Scene", "ScenePolicy", "policy_loss"]
 
 OBS, ACT, STEPS = 3, 2, 64
 EPSILON = 0.2
 
 Loss: TypeAlias = Callable[..., Tensor]
-"""``loss(actor, critic, batch, law, clip_range, entropy_coef, value_coef)``."""
+"""``loss(policy, critic, batch, advantage, to_go, old_log_prob, clip_range, entropy_coef, value_coef)``."""
 Check: TypeAlias = Callable[[Loss], "str | None"]
 """Returns what is wrong, or None."""
 
 
-class SceneLaw(NamedTuple):
-    """What PPO asks of a policy family: the chapter's `SceneLaw`."""
+@dataclasses.dataclass
+class ScenePolicy:
+    """A Gaussian policy as the growing program has one, its density and entropy being the package's."""
 
-    log_prob: Callable[[Tensor, Tensor], Tensor]
-    """Outputs `[B, 2A]` and latents `[B, A]` to `[B]`."""
-    entropy: Callable[[Tensor], Tensor]
-    """Outputs `[B, 2A]` to `[B]`."""
+    net: nn.Sequential
+    """Observations `[B, O]` to outputs `[B, 2A]`."""
 
+    def log_prob(self, obs: Tensor, latent: Tensor) -> Tensor:
+        """Return log-densities `[B]` of latents `[B, A]`."""
+        return NORMAL.log_prob(NORMAL.parameters(self.net(obs), Limits()), latent)
 
-GAUSSIAN = SceneLaw(
-    lambda outputs, latent: NORMAL.log_prob(NORMAL.parameters(outputs, Limits()), latent),
-    lambda outputs: normal_entropy(NORMAL.parameters(outputs, Limits())),
-)
+    def entropy(self, obs: Tensor) -> Tensor:
+        """Return entropies `[B]`, in nats."""
+        return normal_entropy(NORMAL.parameters(self.net(obs), Limits()))
 
 
 @dataclasses.dataclass
 class Scene:
     """Two small networks, and steps that the policy drew."""
 
-    actor: nn.Sequential
+    policy: ScenePolicy
     critic: nn.Sequential
-    batch: SimpleNamespace
+    """Observations `[B, O]` to values `[B]`."""
+    batch: Batch
+    """`obs` `[B, O]` and `latent` `[B, A]`; no loss looks at the other columns."""
+    advantage: Tensor
+    to_go: Tensor
+    old_log_prob: Tensor
 
     @classmethod
     def of(cls, seed: int) -> Scene:
@@ -65,24 +72,26 @@ class Scene:
         for tensor in (*actor.parameters(), *critic.parameters()):
             nn.init.normal_(tensor, std=0.4, generator=generator)
         actor[2].bias.data[ACT:] += 0.3  # type: ignore[operator, index]
-        obs = randn(STEPS, OBS)
+        obs, policy = randn(STEPS, OBS), ScenePolicy(actor)
         with torch.no_grad():
             loc, log_scale = actor(obs).chunk(2, -1)
             latent = loc + log_scale.exp() * randn(STEPS, ACT)
-            log_prob = GAUSSIAN.log_prob(actor(obs), latent)
-        batch = SimpleNamespace(
-            obs=obs, latent=latent, log_prob=log_prob, advantage=randn(STEPS) + 0.2, return_=3 * randn(STEPS)
-        )
-        return cls(actor, critic, batch)
+            old = policy.log_prob(obs, latent)
+        batch, critic = Batch(obs, latent, None, None, None, None), nn.Sequential(*critic, nn.Flatten(0))
+        return cls(policy, critic, batch, randn(STEPS) + 0.2, 3 * randn(STEPS), old)
 
     def with_ratios(self, ratio: Tensor) -> Scene:
         """Change the stored log-probabilities so that the present policy has these ratios."""
-        changed = SimpleNamespace(**vars(self.batch) | {"log_prob": self.batch.log_prob - ratio.log()})
-        return dataclasses.replace(self, batch=changed)
+        return dataclasses.replace(self, old_log_prob=self.old_log_prob - ratio.log())
 
     def with_advantages(self, advantage: Tensor) -> Scene:
         """Change the advantages."""
-        return dataclasses.replace(self, batch=SimpleNamespace(**vars(self.batch) | {"advantage": advantage}))
+        return dataclasses.replace(self, advantage=advantage)
+
+    def loss(self, function: Loss, entropy_coef: float = 0.0, value_coef: float = 0.0) -> Tensor:
+        """Return a loss's value for this minibatch."""
+        steps = self.advantage, self.to_go, self.old_log_prob
+        return function(self.policy, self.critic, self.batch, *steps, EPSILON, entropy_coef, value_coef)
 
     def gradients(self, loss: Tensor) -> tuple[Tensor, Tensor]:
         """Return the gradients for policy and critic, a vector each; zero where the loss does not depend on it."""
@@ -94,11 +103,11 @@ class Scene:
             )
             return torch.cat([each.flatten() for each in found])
 
-        return gradient(self.actor), gradient(self.critic)
+        return gradient(self.policy.net), gradient(self.critic)
 
     def weighted_score(self, weights: Tensor) -> Tensor:
         """Return −mean(weights ∇log π), what a loss's gradient for the policy should be."""
-        log_prob = GAUSSIAN.log_prob(self.actor(self.batch.obs), self.batch.latent)
+        log_prob = self.policy.log_prob(self.batch.obs, self.batch.latent)
         return self.gradients(-(weights * log_prob).mean())[0]
 
 
@@ -108,24 +117,25 @@ def _close(a: Tensor, b: Tensor) -> bool:
 
 def policy_loss(function: Loss, scene: Scene) -> Tensor:
     """Return a loss without entropy and without values."""
-    return function(scene.actor, scene.critic, scene.batch, GAUSSIAN, EPSILON, 0.0, 0.0)
+    return scene.loss(function)
 
 
 def _starts_at_one(function: Loss) -> str | None:
     scene = Scene.of(1)
     value = policy_loss(function, scene).detach()
-    mean = scene.batch.advantage.mean()
+    mean = scene.advantage.mean()
     if value.shape != ():
         return f"the loss must be one number, got the shape {list(value.shape)}"
     if _close(value, -mean):
         return None
     if _close(value, mean):
         return "it has the wrong sign: Adam goes downhill, so the loss is minus the surrogate"
-    if _close(value, -scene.batch.advantage.sum()):
+    if _close(value, -scene.advantage.sum()):
         return "that is a sum over the minibatch; take the mean"
     return (
         "the policy has not moved, so every ratio is 1 and the loss must be minus the mean advantage. Are the latents "
-        "scored as they were drawn, and summed over the action's dimensions?"
+        "scored as they were drawn, and summed over the action's dimensions? are value_coef and entropy_coef used? "
+        "here both are 0"
     )
 
 
@@ -134,9 +144,9 @@ def _weighs_by_the_ratio(function: Loss) -> str | None:
     ratio = torch.linspace(0.85, 1.15, STEPS, dtype=torch.float64)
     moved = scene.with_ratios(ratio)
     gradient = moved.gradients(policy_loss(function, moved))[0]
-    if _close(gradient, moved.weighted_score(ratio * moved.batch.advantage)):
+    if _close(gradient, moved.weighted_score(ratio * moved.advantage)):
         return None
-    if _close(gradient, moved.weighted_score(moved.batch.advantage)):
+    if _close(gradient, moved.weighted_score(moved.advantage)):
         return (
             "the ratio is 1 whatever the policy has done since: divide by the density that *drew* the latent, which is "
             "stored"
@@ -147,9 +157,9 @@ def _weighs_by_the_ratio(function: Loss) -> str | None:
 def _leaves_the_way_back_open(function: Loss) -> str | None:
     scene = Scene.of(3)
     ratio = torch.linspace(0.3, 0.7, STEPS, dtype=torch.float64)
-    moved = scene.with_ratios(ratio).with_advantages(scene.batch.advantage.abs() + 0.1)
+    moved = scene.with_ratios(ratio).with_advantages(scene.advantage.abs() + 0.1)
     gradient = moved.gradients(policy_loss(function, moved))[0]
-    if _close(gradient, moved.weighted_score(ratio * moved.batch.advantage)):
+    if _close(gradient, moved.weighted_score(ratio * moved.advantage)):
         return None
     if not gradient.any():
         return (
@@ -161,7 +171,7 @@ def _leaves_the_way_back_open(function: Loss) -> str | None:
 
 def _knows_bad_actions(function: Loss) -> str | None:
     scene = Scene.of(4)
-    advantage = -scene.batch.advantage.abs() - 0.1
+    advantage = -scene.advantage.abs() - 0.1
     for low, high, alive in ((1.3, 1.7, True), (0.3, 0.7, False)):
         ratio = torch.linspace(low, high, STEPS, dtype=torch.float64)
         moved = scene.with_ratios(ratio).with_advantages(advantage)
@@ -184,7 +194,7 @@ def _knows_bad_actions(function: Loss) -> str | None:
 def _stops_paying(function: Loss) -> str | None:
     scene = Scene.of(5)
     ratio = torch.linspace(1.3, 1.7, STEPS, dtype=torch.float64)
-    moved = scene.with_ratios(ratio).with_advantages(scene.batch.advantage.abs() + 0.1)
+    moved = scene.with_ratios(ratio).with_advantages(scene.advantage.abs() + 0.1)
     gradient = moved.gradients(policy_loss(function, moved))[0]
     if gradient.any():
         return "for Â > 0 and r > 1 + ε the surrogate is flat: nothing may push these ratios further up"
@@ -195,18 +205,17 @@ def _teaches_the_critic(function: Loss) -> str | None:
     scene = Scene.of(6)
     if scene.gradients(policy_loss(function, scene))[1].any():
         return "the surrogate moves the critic: the advantages are constants"
-    loss = function(scene.actor, scene.critic, scene.batch, GAUSSIAN, EPSILON, 0.0, 0.5)
-    gradient = scene.gradients(loss)
-    prediction = scene.critic(scene.batch.obs)[:, 0]
-    right = scene.gradients(0.5 * (prediction - scene.batch.return_).square().mean())[1]
-    spread = scene.gradients(0.5 * (prediction[:, None] - scene.batch.return_).square().mean())[1]
+    gradient = scene.gradients(scene.loss(function, value_coef=0.5))
+    prediction = scene.critic(scene.batch.obs)
+    right = scene.gradients(0.5 * (prediction - scene.to_go).square().mean())[1]
+    spread = scene.gradients(0.5 * (prediction[:, None] - scene.to_go).square().mean())[1]
     if _close(gradient[1], spread):
         return (
             "[B, 1] minus [B] is [B, B]: every value is compared with every return, and the critic learns their mean. "
-            "Drop the last axis of the critic's output"
+            "Both must have the shape [B]"
         )
     if not _close(gradient[1], right):
-        return "the critic's gradient must be that of value_coef times the mean of (V − R)²"
+        return "the critic's gradient must be that of value_coef times the mean of (V − Ĝ)²"
     if not _close(gradient[0], scene.gradients(policy_loss(function, scene))[0]):
         return "the value loss moves the policy"
     return None
@@ -214,11 +223,9 @@ def _teaches_the_critic(function: Loss) -> str | None:
 
 def _pays_for_entropy(function: Loss) -> str | None:
     scene = Scene.of(7)
-    still = scene.with_advantages(0 * scene.batch.advantage)
-    gradient = still.gradients(function(still.actor, still.critic, still.batch, GAUSSIAN, EPSILON, 0.1, 0.0))[
-        0
-    ]
-    right = still.gradients(-0.1 * GAUSSIAN.entropy(still.actor(still.batch.obs)).mean())[0]
+    still = scene.with_advantages(0 * scene.advantage)
+    gradient = still.gradients(still.loss(function, entropy_coef=0.1))[0]
+    right = still.gradients(-0.1 * still.policy.entropy(still.batch.obs).mean())[0]
     if _close(gradient, right):
         return None
     if _close(gradient, -right):

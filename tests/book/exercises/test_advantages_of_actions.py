@@ -110,6 +110,14 @@ RIGHT = {
         (lambda *a: growing(*a, weight=lambda gamma, lam: 0.0), "residuals alone"),
         (lambda *a: growing(*a)[0], "return two things"),
         (lambda *a: growing(*a, plus=-1.0), "*plus* the value"),
+        (lambda *a: growing(*a, plus=0.0), "not the advantage"),
+        (
+            lambda batch, critic, *a: (
+                back := growing(batch, critic, *a)[0].flip(0),
+                back + critic(batch.obs),
+            ),
+            "wrong way round",
+        ),
         (lambda *a: tuple(1 + x for x in growing(*a)), "the value is wrong"),
         (lambda batch, critic, gamma, lam: batch.rewards, "AttributeError"),
     ],

@@ -133,3 +133,11 @@ def test_mistakes_of_the_growing_program(wrong: Callable, words: str) -> None:
 def test_the_growing_program_s_surrogate_passes() -> None:
     assert graders.surrogate(growing).passed is True
     assert graders.surrogate(lambda *_: ...).passed is None
+
+
+def test_a_clipped_surrogate_is_told_from_this_one() -> None:
+    def clipped(policy, batch, advantage, old):
+        ratio = torch.exp(policy.log_prob(batch.obs, batch.latent) - old)
+        return torch.minimum(ratio * advantage, ratio.clamp(0.8, 1.2) * advantage).mean()
+
+    assert "PPO's, clipped" in graders.surrogate(clipped).message

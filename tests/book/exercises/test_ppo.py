@@ -1,56 +1,61 @@
-"""The graders of *PPO, step by step* pass the right answers and name the known mistakes."""
+"""The graders of *PPO* pass the right answers and name the known mistakes."""
 
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
+from torch.distributions import Normal, kl_divergence
 
 from inbounds.book.exercises import ppo as graders
 from inbounds.book.ppo_checks import CHECKS
+from inbounds.book.small_updates import PPO, Small
 
 
-def surrogate(ratio, advantage, clip_range):
+def capped(ratio, advantage, clip_range):
     """By cases, as a decision and not as a minimum."""
     flat = torch.sign(advantage) * (ratio - 1) > clip_range
     return torch.where(flat, (1 + clip_range * torch.sign(advantage)) * advantage, ratio * advantage)
 
 
+def right_surrogate(policy, batch, advantage, old_log_prob, clip_range=0.2):
+    ratio = torch.exp(policy.log_prob(batch.obs, batch.latent) - old_log_prob)
+    return capped(ratio, advantage, clip_range).mean()
+
+
 def loss_with(change: str = "") -> Callable[..., Any]:
     """A right loss, or one with a mistake."""
 
-    def ppo_loss(actor, critic, batch, law, clip_range=0.2, entropy_coef=1e-4, value_coef=0.5):
-        outputs = actor(batch.obs)
+    def loss(policy, critic, batch, advantage, to_go, old_log_prob, clip_range, entropy_coef, value_coef):
         latent = batch.latent.clamp(-1, 1) if change == "executed" else batch.latent
-        log_prob = law.log_prob(outputs, latent)
-        old = log_prob.detach() if change == "own density" else batch.log_prob
-        ratio = torch.exp(log_prob - old)
+        log_prob = policy.log_prob(batch.obs, latent)
+        ratio = torch.exp(log_prob - (log_prob.detach() if change == "own density" else old_log_prob))
         clipped = ratio.clamp(1 - clip_range, 1 + clip_range)
         gain = {
-            "": surrogate(ratio, batch.advantage, clip_range),
-            "no minimum": clipped * batch.advantage,
-            "minimum first": torch.minimum(ratio, clipped) * batch.advantage,
-            "no clip": ratio * batch.advantage,
-        }.get(change, surrogate(ratio, batch.advantage, clip_range))
+            "no minimum": clipped * advantage,
+            "minimum first": torch.minimum(ratio, clipped) * advantage,
+            "no clip": ratio * advantage,
+        }.get(change, capped(ratio, advantage, clip_range))
         gain = gain.sum() if change == "sum" else gain.mean()
-        value = critic(batch.obs) if change == "broadcast" else critic(batch.obs)[:, 0]
-        error = (value - batch.return_).square().mean()
+        value = critic(batch.obs)[:, None] if change == "broadcast" else critic(batch.obs)
+        error = (value - to_go).square().mean()
         if change == "leak":  # no other value, another gradient
             gain = gain + (value - value.detach()).mean()
         if change == "coupled":
-            error = error + (outputs - outputs.detach()).mean()
+            error = error + (log_prob - log_prob.detach()).mean()
         if change == "values doubled":
             error = 2 * error
-        bonus = entropy_coef * law.entropy(outputs).mean()
+        bonus = entropy_coef * policy.entropy(batch.obs).mean()
         signs = {"uphill": (1, 1), "entropy sign": (-1, 1), "no entropy": (-1, 0)}.get(change, (-1, -1))
         return value_coef * error + signs[0] * gain + signs[1] * bonus
 
-    return ppo_loss
+    return loss
 
 
 def test_a_right_loss_passes_every_check() -> None:
-    verdict = graders.ppo_loss(loss_with())
+    verdict = graders.loss(loss_with())
     assert verdict.passed is True, verdict
 
 
@@ -73,7 +78,7 @@ def test_a_right_loss_passes_every_check() -> None:
     ],
 )
 def test_every_broken_loss_is_stopped_by_its_check(change: str, check: str, words: str) -> None:
-    verdict = graders.ppo_loss(loss_with(change))
+    verdict = graders.loss(loss_with(change))
     assert verdict.passed is False
     assert verdict.message.startswith(f'check "{check}"')
     assert words in verdict.message
@@ -82,26 +87,23 @@ def test_every_broken_loss_is_stopped_by_its_check(change: str, check: str, word
 def test_a_surrogate_that_never_stops_paying_is_seen() -> None:
     """Right for bad actions, without an upper corner for good ones."""
 
-    def ppo_loss(actor, critic, batch, law, clip_range, entropy_coef, value_coef):
-        ratio = torch.exp(law.log_prob(actor(batch.obs), batch.latent) - batch.log_prob)
-        paid = torch.where(
-            batch.advantage > 0, ratio * batch.advantage, surrogate(ratio, batch.advantage, clip_range)
-        )
-        return -paid.mean()
+    def loss(policy, critic, batch, advantage, to_go, old, clip_range, entropy_coef, value_coef):
+        ratio = torch.exp(policy.log_prob(batch.obs, batch.latent) - old)
+        return -torch.where(advantage > 0, ratio * advantage, capped(ratio, advantage, clip_range)).mean()
 
-    assert 'check "stops paying"' in graders.ppo_loss(ppo_loss).message
+    assert 'check "stops paying"' in graders.loss(loss).message
 
 
 def test_the_checks_say_when_a_loss_is_not_written_or_raises() -> None:
-    assert graders.ppo_loss(lambda *_: ...).passed is None
-    verdict = graders.ppo_loss(lambda actor, *_: actor(torch.zeros(2)))
+    assert graders.loss(lambda *_: ...).passed is None
+    verdict = graders.loss(lambda policy, *_: policy.net(torch.zeros(2)))
     assert verdict.passed is False
     assert "raised RuntimeError" in verdict.message
-    assert "one number" in graders.ppo_loss(lambda a, c, batch, *_: -batch.advantage).message
+    assert "one number" in graders.loss(lambda p, c, b, advantage, *_: -advantage).message
 
 
 LOSSES = {name: loss_with(name) for name in ("executed", "own density", "no minimum", "broadcast")}
-RIGHT = dict(
+ANSWERS = dict(
     zip(
         LOSSES,
         ["starts at one", "weighs by the ratio", "leaves the way back open", "teaches the critic"],
@@ -119,49 +121,61 @@ RIGHT = dict(
     ],
 )
 def test_a_wrong_diagnosis_is_told_where(changed: dict[str, str], words: str) -> None:
-    assert graders.diagnosis(RIGHT, LOSSES).passed is True
-    verdict = graders.diagnosis(RIGHT | changed, LOSSES)
+    assert graders.diagnosis(ANSWERS, LOSSES).passed is True
+    verdict = graders.diagnosis(ANSWERS | changed, LOSSES)
     assert verdict.passed is False
     assert words in verdict.message
-    assert graders.diagnosis(RIGHT | {"executed": ...}, LOSSES).passed is None
+    assert graders.diagnosis(ANSWERS | {"executed": ...}, LOSSES).passed is None
+
+
+def right_advantages(batch, critic, gamma=0.99, lam=0.95):
+    value, after = critic(batch.obs).detach(), critic(batch.next_obs).detach()
+    advantage, later = torch.zeros_like(value), 0.0
+    for t in reversed(range(len(value))):
+        stays = 1 - batch.terminated[t]
+        later = gamma * lam * stays * (1 - batch.truncated[t]) * later
+        later = later + batch.reward[t] + gamma * stays * after[t] - value[t]
+        advantage[t] = later
+    return advantage, advantage + value
 
 
 def update_with(change: str = "") -> Callable[..., None]:
     """A right update, or one with a mistake."""
 
-    def ppo_update(actor, critic, optimizer, data, law, rng, **options):
-        epochs, size, norm = (options.pop(k) for k in ("num_epochs", "minibatch_size", "max_grad_norm"))
+    def update(policy, critic, adam, batch, passes, size, **options):
         options |= {"value_coef": 1.0} if change == "values" else {}
         options |= {"entropy_coef": 0.0} if change == "entropy" else {}
         options |= {"clip_range": 0.2} if change == "clip range" else {}
-        advantage = data.advantage
+        if change == "no coefficients":
+            options = {"clip_range": 0.2, "entropy_coef": 1e-4, "value_coef": 0.5}
+        advantage, to_go = right_advantages(batch, critic)
+        old = policy.log_prob(batch.obs, batch.latent).detach()
         if change == "whole":
             advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        once = rng.permutation(len(data.obs))
-        for epoch in range(1 if change == "one pass" else epochs):
-            order = once if epoch == 0 or change == "one order" else rng.permutation(len(data.obs))
+        once = torch.randperm(len(old))
+        for epoch in range(1 if change == "one pass" else passes):
+            order = once if epoch == 0 or change == "one order" else torch.randperm(len(old))
             for start in range(0, len(order), size):
-                index = torch.from_numpy(order[start : start + size])
+                index = order[start : start + size]
                 part = advantage[index]
                 if change not in ("whole", "raw"):
                     part = (part - part.mean()) / (part.std() + 1e-8)
-                columns = {name: column[index] for name, column in data._asdict().items()}
-                batch = type(data)(**columns | {"advantage": part})
+                few = type(batch)(*(column[index] for column in batch))
                 if change != "accumulate":
-                    optimizer.zero_grad()
-                loss_with()(actor, critic, batch, law, **options).backward()
-                if change == "apart":
-                    for network in (actor, critic):
-                        nn.utils.clip_grad_norm_(network.parameters(), norm)
-                elif change != "free":
-                    nn.utils.clip_grad_norm_([*actor.parameters(), *critic.parameters()], norm)
-                optimizer.step()
+                    adam.zero_grad()
+                mine = policy.log_prob(few.obs, few.latent).detach() if change == "own" else old[index]
+                loss_with()(policy, critic, few, part, to_go[index], mine, **options).backward()
+                both = [*policy.net.parameters()], [*critic.parameters()]
+                for weights in both if change == "apart" else ([*both[0], *both[1]],):
+                    if change != "free":
+                        nn.utils.clip_grad_norm_(weights, 0.5)
+                adam.step()
 
-    return ppo_update
+    return update
 
 
 def test_a_right_update_ends_where_the_package_ends() -> None:
-    verdict = graders.ppo_update(update_with())
+    verdict = graders.update(update_with())
     assert verdict.passed is True, verdict
 
 
@@ -176,37 +190,121 @@ def test_a_right_update_ends_where_the_package_ends() -> None:
         ("entropy", "entropy bonus is missing"),
         ("values", "value_coef"),
         ("clip range", "clip_range"),
+        ("no coefficients", "passed on to loss"),
         ("accumulate", "zero_grad"),
         ("apart", "one norm over both"),
+        ("own", "every ratio is 1"),
     ],
 )
 def test_known_mistakes_of_an_update_are_named(change: str, words: str) -> None:
-    verdict = graders.ppo_update(update_with(change))
+    verdict = graders.update(update_with(change))
     assert verdict.passed is False
     assert words in verdict.message
 
 
-def test_an_update_that_raises_or_does_nothing() -> None:
-    assert graders.ppo_update(lambda *_, **__: None).passed is None
-    assert "raised TypeError" in graders.ppo_update(lambda actor: None).message
+def test_without_a_flaw_the_grader_s_own_loop_is_the_package() -> None:
+    torch.testing.assert_close(Small().after_a_flawed(""), Small().after_the_packages(PPO))
+    flawed = [Small().after_a_flawed(flaw) for flaw in graders.MISTAKES.values()]
+    assert len({tuple(weights.tolist()) for weights in flawed}) == len(graders.MISTAKES)
+
+
+def test_an_update_that_raises_does_nothing_or_goes_elsewhere() -> None:
+    assert graders.update(lambda *_, **__: None).passed is None
+    assert "raised TypeError" in graders.update(lambda policy: None).message
+
+    def lost(policy, critic, adam, batch, **_):
+        policy.net[0].weight.data += 1.0
+
+    assert "in no way that is known" in graders.update(lost).message
+
+
+def surrogate_of(function: Callable) -> Callable:
+    def surrogate(policy, batch, advantage, old_log_prob, clip_range):
+        ratio = torch.exp(policy.log_prob(batch.obs, batch.latent) - old_log_prob)
+        return function(ratio, advantage, clip_range)
+
+    return surrogate
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda r, a, e: r * a, "nothing is clipped"),
-        (lambda r, a, e: r.clamp(1 - e, 1 + e) * a, "without the minimum"),
-        (lambda r, a, e: torch.minimum(r, r.clamp(1 - e, 1 + e)) * a, "not of the two ratios"),
-        (lambda r, a, e: torch.maximum(r * a, r.clamp(1 - e, 1 + e) * a), "larger of the two"),
-        (lambda r, a, e: -surrogate(r, a, e), "minus the surrogate"),
-        (lambda r, a, e: surrogate(r, a, 0.2), "expected"),
+        (lambda w, a, e: a.mean(), "no ratio"),
+        (lambda w, a, e: capped(1 / w, a, e).mean(), "upside down"),
+        (lambda w, a, e: torch.minimum(w.log() * a, a + e * a.abs()).mean(), "logarithm"),
+        (lambda w, a, e: (w * a).mean(), "nothing is clipped"),
+        (lambda w, a, e: (w.clamp(1 - e, 1 + e) * a).mean(), "without the minimum"),
+        (lambda w, a, e: (torch.minimum(w, w.clamp(1 - e, 1 + e)) * a).mean(), "not of the two ratios"),
+        (lambda w, a, e: torch.maximum(w * a, w.clamp(1 - e, 1 + e) * a).mean(), "larger of the two"),
+        (lambda w, a, e: -capped(w, a, e).mean(), "minus the surrogate"),
+        (lambda w, a, e: capped(w, a, e).sum(), "take the mean"),
+        (lambda w, a, e: capped(w, a, 0.2).mean(), "expected"),
     ],
 )
 def test_known_mistakes_of_the_surrogate_are_named(wrong: Callable, words: str) -> None:
-    assert graders.clipped_surrogate(surrogate).passed is True
-    verdict = graders.clipped_surrogate(wrong)
+    verdict = graders.surrogate(surrogate_of(wrong))
     assert verdict.passed is False
     assert words in verdict.message
+
+
+def test_a_quotient_of_log_densities_is_no_ratio() -> None:
+    def quotient(policy, batch, advantage, old_log_prob, clip_range):
+        return capped(policy.log_prob(batch.obs, batch.latent) / old_log_prob, advantage, clip_range).mean()
+
+    assert "subtract the log-densities" in graders.surrogate(quotient).message
+
+
+class RightPolicy:
+    def __init__(self, obs_dim, box, law, squeeze):
+        self.law, self.net = law, nn.Linear(obs_dim, 2 * len(box.low))
+
+    def log_prob(self, obs, latent):
+        return self.law(self.net(obs)).log_prob(latent).sum(-1)
+
+    def entropy(self, obs):
+        return self.law(self.net(obs)).entropy().sum(-1)
+
+    def kl(self, old, obs):
+        return kl_divergence(self.law(old), self.law(self.net(obs))).sum(-1)
+
+
+def changed(**methods: Callable) -> type:
+    return type("Policy", (RightPolicy,), methods)
+
+
+def law(self, obs: torch.Tensor) -> Normal:
+    return self.law(self.net(obs))
+
+
+@pytest.mark.parametrize(
+    ("methods", "words"),
+    [
+        ({"log_prob": lambda self, obs, z: law(self, obs).log_prob(z)}, "log_prob: a step has one number"),
+        (
+            {"log_prob": lambda self, obs, z: law(self, obs).log_prob(z).mean(-1)},
+            "log_prob: that is the mean",
+        ),
+        (
+            {"log_prob": lambda self, obs, z: law(self, obs).log_prob(z).sum()},
+            "log_prob: the shape must be [B]",
+        ),
+        ({"entropy": lambda self, obs: law(self, obs).entropy()}, "entropy: a step has one number"),
+        (
+            {"kl": lambda self, old, obs: kl_divergence(law(self, obs), self.law(old)).sum(-1)},
+            "kl: it must be KL(old‖new)",
+        ),
+        ({"kl": lambda self, old, obs: np.zeros(5)}, "kl: a tensor is wanted"),
+        ({"entropy": lambda self, obs: ...}, "write entropy"),
+    ],
+)
+def test_known_mistakes_of_a_policy_are_named(methods: dict[str, Callable], words: str) -> None:
+    assert graders.policy(RightPolicy).passed is True
+    verdict = graders.policy(changed(**methods))
+    assert verdict.passed is not True
+    assert words in verdict.message
+
+
+RIGHT = {"surrogate": right_surrogate}
 
 
 def test_there_are_seven_checks() -> None:

@@ -69,6 +69,12 @@ def advantages(function: Callable[..., Any]) -> Judgement:
             "the second result is what the critic learns: the advantage *plus* the value": np.stack(
                 [right[0], right[0] - value]
             ),
+            "the second result is what the critic learns: the advantage *plus* the value, not the advantage": np.stack(
+                [right[0], right[0]]
+            ),
+            "the loop runs backwards, so the list is the wrong way round: turn it": np.stack(
+                [right[0][::-1], right[0][::-1] + value]
+            ),
         }
         return Case((batch, lambda obs: obs[:, 0], gamma, lam), right, mistakes)
 

@@ -79,7 +79,12 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
             return [float(np.mean(weight * advantage)), float(np.mean(slope * advantage))]
 
         right = both(ratio, ratio * step)
+        flat = np.sign(advantage) * (ratio - 1) > 0.2
+        capped = np.where(flat, 1 + 0.2 * np.sign(advantage), ratio)
         mistakes = {
+            "that is PPO's, clipped at 0.2: nothing is clipped here": both(
+                capped, np.where(flat, 0.0, ratio * step)
+            ),
             "no gradient reaches the policy: nothing of the new log-probability may be detached": [
                 right[0],
                 0.0,

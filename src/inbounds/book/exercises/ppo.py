@@ -1,4 +1,4 @@
-"""Graders of the chapter *PPO, step by step* (`judging` tells how one works).
+"""Graders of the chapter *PPO* (`judging` tells how one works): one for each function of the program that it writes.
 
 A loss is judged by the named checks of `inbounds.book.ppo_checks`; the verdict names the first that fails. A whole
 update is judged by where it takes the weights, beside `inbounds.learning.ppo.update`.
@@ -6,74 +6,151 @@ update is judged by where it takes the weights, beside `inbounds.learning.ppo.up
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
+from torch.distributions import Normal
 
-from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
-from inbounds.book.ppo_checks import ACT, CHECKS, GAUSSIAN, OBS, STEPS, Loss, Scene, policy_loss
-from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig, Rollout, ppo
-from inbounds.learning.updates.minibatches import Minibatch
-
-__all__ = ["clipped_surrogate", "diagnosis", "ppo_loss", "ppo_update"]
-
-_COEFFICIENTS = (
-    "num_epochs",
-    "minibatch_size",
-    "max_grad_norm",
-    "clip_range",
-    "entropy_coef",
-    "value_coef",
+from inbounds.book.exercises.judging import (
+    Case,
+    Judgement,
+    judge_by_checks,
+    judge_cases,
+    judge_diagnosis,
 )
+from inbounds.book.ppo_checks import CHECKS, Loss, Scene, policy_loss
+from inbounds.book.small_updates import PPO, SEED, Small
+
+__all__ = ["diagnosis", "loss", "policy", "surrogate", "update"]
 
 
-def clipped_surrogate(function: Callable[..., Any]) -> Judgement:
-    """min(r Â, clip(r) Â), elementwise.
+def policy(make: Callable[..., Any]) -> Judgement:
+    """The policy's density, entropy and divergence: one number a step, whatever the number of motors.
 
     Args:
-        function: the reader's ``clipped_surrogate(ratio, advantage, clip_range)``, of tensors.
+        make: the reader's class ``Policy(obs_dim, box, law, squeeze)``.
 
     Example:
-        >>> clipped_surrogate(lambda ratio, advantage, clip_range: ratio * advantage)
-        ✗ not yet: <lambda>: nothing is clipped: a good action is paid for every rise of its ratio
+        >>> policy(lambda *arguments: ...)
+        … not answered: <lambda>: write it, and run this cell again
+    """
+    name = getattr(make, "__name__", "Policy")
+
+    def law(outputs: Tensor) -> Normal:
+        loc, log_scale = outputs.chunk(2, -1)
+        return Normal(loc, log_scale.exp())
+
+    box = SimpleNamespace(low=-np.ones(2), high=np.ones(2))
+    obs, latent = torch.linspace(-1, 1, 15).reshape(5, 3), torch.linspace(-2, 2, 10).reshape(5, 2)
+    try:
+        made = make(3, box, law, lambda z, low, high: z)
+        if not hasattr(made, "net"):
+            return Judgement(name, None, "write it, and run this cell again")
+        outputs = made.net(obs).detach()
+        old = 0.5 * outputs - 0.3
+        found = {
+            "log_prob": made.log_prob(obs, latent),
+            "entropy": made.entropy(obs),
+            "kl": made.kl(old, obs),
+        }
+    except Exception as error:
+        return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
+    (loc, log_scale), (old_loc, old_log_scale) = outputs.chunk(2, -1), old.chunk(2, -1)
+    u = (latent - loc) / log_scale.exp()
+    shift = ((loc - old_loc) ** 2 + torch.exp(2 * old_log_scale)) / (2 * torch.exp(2 * log_scale))
+    right = {
+        "log_prob": -(u**2) / 2 - log_scale - np.log(2 * np.pi) / 2,
+        "entropy": log_scale + np.log(2 * np.pi * np.e) / 2,
+        "kl": log_scale - old_log_scale + shift - 0.5,
+    }
+    for method, each in right.items():
+        answer = found[method]
+        if answer is None or answer is ...:
+            return Judgement(name, None, f"write {method}, and run this cell again")
+        if complaint := _of_a_law(method, answer, each):
+            return Judgement(name, False, f"{method}: {complaint}")
+    return Judgement(name, True, "one number a step: the motors' sum")
+
+
+def _of_a_law(method: str, answer: Any, each: Tensor) -> str:
+    """What is wrong with a method's answer, given the right one of each motor `[B, A]`."""
+    if not isinstance(answer, Tensor):
+        return f"a tensor is wanted, got {type(answer).__name__}"
+    total, mean = each.sum(-1), each.mean(-1)
+    if answer.shape == each.shape:
+        return "a step has one number, not one for each motor: sum over the last axis"
+    if answer.shape != total.shape:
+        return f"the shape must be [B] = {list(total.shape)}, got {list(answer.shape)}"
+    if torch.allclose(answer, total, rtol=1e-4, atol=1e-5):
+        return ""
+    if torch.allclose(answer, mean, rtol=1e-4, atol=1e-5):
+        return "that is the mean over the motors; independent motors *add*"
+    if method == "kl":
+        return "it must be KL(old‖new): the old law comes first, and the new one is that of self.net(obs)"
+    return "the value is wrong: ask the law of self.net(obs)"
+
+
+def surrogate(function: Callable[..., Any]) -> Judgement:
+    """PPO's clipped surrogate: the mean of min(w Â, clip(w) Â).
+
+    Args:
+        function: the reader's ``surrogate(policy, batch, advantage, old_log_prob, clip_range)``.
+
+    Example:
+        >>> surrogate(lambda policy, batch, advantage, old_log_prob, clip_range: advantage.mean())
+        ✗ not yet: <lambda>: there is no ratio in it: exp(new log-probability − old)
     """
 
     def case(ratio: list[float], advantage: list[float], clip_range: float) -> Case:
-        r, a = np.array(ratio), np.array(advantage)
-        clipped = np.clip(r, 1 - clip_range, 1 + clip_range)
-        first = r * a
+        w, a = np.array(ratio), np.array(advantage)
+        clipped = np.clip(w, 1 - clip_range, 1 + clip_range)
+        first, right = w * a, a + clip_range * np.abs(a)  # a capped gain, unlike the chapter's solution
         mistakes = {
+            "there is no ratio in it: exp(new log-probability − old)": a,
+            "the ratio is upside down: new over old": np.minimum(a / w, right),
+            "that is the logarithm of the ratio: take its exponential": np.minimum(np.log(w) * a, right),
             "nothing is clipped: a good action is paid for every rise of its ratio": first,
             "without the minimum, a ratio that moved the wrong way gets no gradient back": clipped * a,
-            "take the smaller of the two products, not of the two ratios: it matters where Â < 0": np.minimum(
-                r, clipped
-            )
-            * a,
+            "take the smaller of the two products, not of the two ratios: it matters where Â < 0": a
+            * np.minimum(w, clipped),
             "that is the larger of the two: the surrogate is pessimistic": np.maximum(first, clipped * a),
             "that is minus the surrogate: it is maximised; the loss takes the minus": -np.minimum(
-                first, clipped * a
+                first, right
             ),
         }
-        # What a capped gain says in one line, unlike the chapter's solution.
-        expected = np.minimum(first, a + clip_range * np.abs(a))
-        return Case((torch.tensor(r), torch.tensor(a), clip_range), expected, mistakes)
+        old = np.linspace(-1, 1, len(w))
+        quotient = (old + np.log(w)) / old
+        mistakes["a ratio of *densities*: subtract the log-densities, then take the exponential"] = (
+            np.minimum(quotient * a, np.clip(quotient, 1 - clip_range, 1 + clip_range) * a)
+        )
+        expected = np.minimum(first, right)
+        values = {words: wrong.mean() for words, wrong in mistakes.items()}
+        if len(w) > 1:
+            values |= {"that is a sum over the batch: take the mean": expected.sum()}
+            values |= {"one number is wanted, the mean over the batch": expected}
+        new, before = torch.tensor(old + np.log(w)), torch.tensor(old)
+        policy = SimpleNamespace(log_prob=lambda obs, latent: new)
+        batch = SimpleNamespace(obs=torch.zeros(len(w), 1), latent=torch.zeros(len(w), 1))
+        return Case((policy, batch, torch.tensor(a), before, clip_range), expected.mean(), values)
 
     six = [0.5, 1.05, 1.7, 0.5, 1.05, 1.7], [2.0, 2.0, 2.0, -1.0, -1.0, -1.0]
-    return judge_cases(function, [case(*six, 0.2), case(*six, 0.02)], "right, in all six cases")
+    cases = [case([1.05], [2.0], 0.2), case(*six, 0.2), case(*six, 0.02)]
+    return judge_cases(function, cases, "right, in all six cases")
 
 
-def ppo_loss(function: Loss) -> Judgement:
+def loss(function: Loss) -> Judgement:
     """PPO's loss of one minibatch, by the named checks.
 
     Args:
-        function: the reader's ``ppo_loss(actor, critic, batch, law, clip_range, entropy_coef, value_coef)``.
+        function: the reader's ``loss(policy, critic, batch, advantage, to_go, old_log_prob, clip_range,
+            entropy_coef, value_coef)``.
 
     Example:
-        >>> ppo_loss(lambda *arguments: ...)
+        >>> loss(lambda *arguments: ...)
         … not answered: <lambda>: write it, and run this cell again
     """
 
@@ -98,50 +175,37 @@ def diagnosis(answers: Mapping[str, Any], losses: Mapping[str, Loss]) -> Judgeme
     return judge_diagnosis(answers, losses, CHECKS, "loss", stopped_before, lets_pass)
 
 
-class _OneOrder:
-    """A generator that shuffles in the same way each time: the mistake of shuffling once."""
-
-    def __init__(self, seed: int) -> None:
-        self.seed = seed
-
-    def permutation(self, length: int) -> np.ndarray:
-        return np.random.default_rng(self.seed).permutation(length)
-
-
-def ppo_update(function: Callable[..., Any]) -> Judgement:
+def update(function: Callable[..., Any]) -> Judgement:
     """A whole update: where it takes the weights, beside the package.
 
     Args:
-        function: the reader's ``ppo_update(actor, critic, optimizer, data, law, rng, num_epochs, minibatch_size,
-            max_grad_norm, clip_range, entropy_coef, value_coef)``, which changes the networks in place.
+        function: the reader's ``update(policy, critic, adam, batch, passes, size, clip_range, entropy_coef,
+            value_coef)``, which changes the networks in place; it shuffles with `torch.randperm`, once a pass.
 
     Example:
-        >>> ppo_update(lambda *arguments, **options: None)
+        >>> update(lambda *arguments, **options: None)
         … not answered: <lambda>: the weights have not moved: write it, and run this cell again
     """
-    name = getattr(function, "__name__", "your function")
-    config = PPOConfig(
-        horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.05, clip_range=0.1
-    )
-    start = _networks()
-    actor, critic = (_sequential(net) for net in start.networks)
-    before = _weights(actor, critic)
-    optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], 1e-2, eps=config.adam_eps)
-    options = {key: getattr(config, key) for key in _COEFFICIENTS}
-    rng = np.random.default_rng(8)
+    name, small = getattr(function, "__name__", "your function"), Small()
+    before = small.weights()
+    torch.manual_seed(SEED)
+    coefficients = {key: getattr(PPO, key) for key in ("clip_range", "entropy_coef", "value_coef")}
     try:
-        function(actor, critic, optimizer, _data(start), GAUSSIAN, rng, **options)
+        function(small.policy, small.critic, small.adam(PPO), small.batch, passes=3, size=16, **coefficients)
     except Exception as error:
         return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
-    after = _weights(actor, critic)
+    after = small.weights()
     if torch.equal(before, after):
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
-    if _same(after, _package(config)):
+    if _same(after, small.after_the_packages(PPO)):
         return Judgement(name, True, "its weights are the package's, after every minibatch of three passes")
-    for mistake, wrong in _mistakes(config).items():
-        if _same(after, wrong):
+    for mistake, flaw in MISTAKES.items():
+        if _same(after, Small().after_a_flawed(flaw)):
             return Judgement(name, False, mistake)
-    hints = "zero_grad before every backward? one norm over both networks? the stored log-probabilities left alone?"
+    hints = (
+        "is torch.randperm called once a pass, and for nothing else? are the advantages and the old log-probabilities "
+        "computed once, before the first step?"
+    )
     return Judgement(
         name, False, f"the weights end elsewhere than the package's, in no way that is known: {hints}"
     )
@@ -151,95 +215,18 @@ def _same(a: Tensor, b: Tensor) -> bool:
     return torch.allclose(a, b, rtol=1e-6, atol=1e-8)
 
 
-def _mistakes(config: PPOConfig) -> dict[str, Tensor]:
-    """Diagnosis → the weights that this mistake leads to."""
-
-    def changed(**values: Any) -> Tensor:
-        return _package(dataclasses.replace(config, **values))
-
-    return {
-        "advantages are normalised over the whole batch; do it in each minibatch": _package(
-            dataclasses.replace(config, normalize_advantage=False), whole=True
-        ),
-        "the advantages are not normalised": changed(normalize_advantage=False),
-        "the steps are shuffled once; shuffle anew in each pass": _package(config, _OneOrder(8)),
-        "only one pass is made over the data": changed(num_epochs=1),
-        "the gradient is not clipped": changed(max_grad_norm=None),
-        "the entropy bonus is missing": changed(entropy_coef=0.0),
-        "value_coef is not used": changed(value_coef=1.0),
-        "clip_range is not used": changed(clip_range=0.2),
-    }
-
-
-def _networks() -> ActorCritic:
-    policy = Policy(PolicyConfig("gaussian"), -np.ones(ACT), np.ones(ACT))
-    network = NetworkConfig(hidden_sizes=(8, 8), dtype="float64", policy_head_gain=0.5)
-    return ActorCritic(policy, OBS, network, [torch.Generator().manual_seed(3)])
-
-
-def _sequential(net: Any) -> nn.Sequential:
-    """The one seed of an `Mlp` as torch's own layers."""
-    layers: list[nn.Module] = []
-    for layer in net.layers:
-        size_out, size_in = layer.weight.shape[1:]
-        linear = nn.Linear(size_in, size_out).double()
-        linear.weight.data.copy_(layer.weight[0])
-        linear.bias.data.copy_(layer.bias[0, :, 0])
-        layers += [linear, nn.Tanh()]
-    return nn.Sequential(*layers[:-1])
-
-
-def _weights(*networks: nn.Sequential) -> Tensor:
-    return torch.cat([p.detach().flatten().clone() for net in networks for p in net.parameters()])
-
-
-def _data(networks: ActorCritic) -> Minibatch:
-    """The steps `[T]` of one seed: drawn by the policy, with advantages and returns of no meaning."""
-    generator = torch.Generator().manual_seed(9)
-    obs, noise = (
-        torch.randn(1, STEPS, size, generator=generator, dtype=torch.float64) for size in (OBS, ACT)
-    )
-    advantage, return_ = torch.randn(2, STEPS, generator=generator, dtype=torch.float64)
-    with torch.no_grad():
-        parameters = networks.parameters(obs)
-        loc, log_scale = parameters
-        latent = loc + log_scale.exp() * noise
-        log_prob = networks.policy.law.log_prob(parameters, latent)
-    return Minibatch(obs[0], latent[0], log_prob[0], 2 * advantage + 1, 3 * return_)
-
-
-def _package(config: PPOConfig, generator: Any = None, whole: bool = False) -> Tensor:
-    """The weights after the package's update of the same networks on the same steps.
-
-    Args:
-        config: the numbers.
-        generator: orders the minibatches.
-        whole: normalise the advantages beforehand.
-    """
-    networks = _networks()
-    data = Minibatch(*(column[None] for column in _data(networks)))
-    advantage = data.advantage
-    if whole:
-        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-    ends = torch.ones_like(advantage, dtype=torch.bool)
-    value = (
-        data.return_ - advantage
-    )  # with every step an episode of its own, Â = reward − value and R = reward
-    rollout = Rollout(
-        obs=data.obs,
-        latent=data.latent,
-        action=data.latent,
-        reward=data.return_,
-        terminated=ends,
-        truncated=~ends,
-        bootstrap=0 * value,
-        value=value,
-        log_prob=data.log_prob,
-        parameters=networks.parameters(data.obs).detach(),
-        saturation=np.zeros(1),
-        action_std=np.ones(1),
-        episode_returns=[[]],
-    )
-    generators = [np.random.default_rng(8) if generator is None else generator]
-    ppo.update(networks, ppo.make_optimizer(networks, config), rollout, generators, config)
-    return torch.cat([p.detach().flatten() for net in networks.networks for p in net.parameters])
+MISTAKES: Mapping[str, str] = {
+    "the advantages are not normalised": "raw",
+    "advantages are normalised over the whole batch; do it in each minibatch": "whole",
+    "the steps are shuffled once; shuffle anew in each pass": "one order",
+    "only one pass is made over the data": "one pass",
+    "the old log-probabilities move along, and every ratio is 1: take them once, before the passes": "own density",
+    "gradients add up from step to step: zero_grad before backward": "accumulate",
+    "the gradient is not clipped: one norm over both networks, at most 0.5": "free",
+    "the gradient is clipped for each network alone: one norm over both": "apart",
+    "the entropy bonus is missing, or entropy_coef is not passed on": "no bonus",
+    "the coefficients are not passed on to loss": "no coefficients",
+    "value_coef is not passed on": "value coef",
+    "clip_range is not passed on": "clip range",
+}
+"""What a grader says → the flaw that leads to these weights."""

@@ -1,215 +1,49 @@
-"""Graders of the chapter *TRPO, step by step* (`judging` tells how one works).
+"""Graders of the chapter *TRPO* (`judging` tells how one works): one for each function of the program that it writes.
 
-A policy step is judged as a black box, ``trpo_step(surrogate, mean_kl, theta, max_kl=δ, damping=c, cg_iters=k)``, on
-problems whose answer dense linear algebra knows. Each of the named checks looks at one property alone, so that one
-broken line fails one of them:
-
-| Check       | What must hold                                                       |
-|-------------|----------------------------------------------------------------------|
-| direction   | the step is parallel to (F + cI)⁻¹ g                                 |
-| length      | ½ Δᵀ(F + cI)Δ = δ, where the line search has nothing to do           |
-| trust       | where the quadratic model fails, the exact KL divergence stays ≤ δ   |
-| improvement | where the linear model fails, the surrogate still goes up            |
-| refusal     | where no length will do, the parameters stay as they were            |
+A policy step is judged by the named checks of `inbounds.book.trpo_checks`, on problems whose answer dense linear
+algebra knows; the verdict names the first that fails. A whole update is judged by where it takes the weights, beside
+`inbounds.learning.trpo.update`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
-from torch.distributions import Normal, kl_divergence
+from torch.nn.utils import parameters_to_vector
 
-from inbounds.book.exercises.judging import (
-    Case,
-    Judgement,
-    detached,
-    judge_by_checks,
-    judge_cases,
-    judge_diagnosis,
-)
+from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
+from inbounds.book.small_updates import SEED, TRPO, Small
+from inbounds.book.trpo_checks import CHECKS, DAMPING, MAX_KL, Step, parallel, problem, round_problem
 
-__all__ = ["CHECKS", "diagnosis", "linear_fisher_product", "trpo_step"]
-
-Step = Callable[..., Tensor]
-
-MAX_KL, DAMPING, CG_ITERS = 0.02, 0.1, 8
-SIZE = 4
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A surrogate and a divergence of Δ = θ − θ_old in closed form.
-
-    The surrogate is gᵀΔ − bend·|Δ|²; the divergence is q + steep·q² with q = ½ΔᵀFΔ: the Hessian at Δ = 0 is F.
-    """
-
-    fisher: Tensor
-    """`[P, P]`."""
-    gradient: Tensor
-    """`[P]`."""
-    bend: float = 0.0
-    steep: float = 0.0
-
-    @property
-    def start(self) -> Tensor:
-        """θ_old `[P]`; not zero, for that would hide a lost start."""
-        return torch.linspace(-1.0, 2.0, SIZE, dtype=torch.float64)
-
-    @property
-    def damped(self) -> Tensor:
-        """F + cI `[P, P]`."""
-        return self.fisher + DAMPING * torch.eye(SIZE, dtype=torch.float64)
-
-    def surrogate(self, theta: Tensor) -> Tensor:
-        """Return the surrogate, 0 at the start."""
-        step = theta - self.start
-        return step @ self.gradient - self.bend * (step @ step)
-
-    def mean_kl(self, theta: Tensor) -> Tensor:
-        """Return the divergence, 0 at the start."""
-        step = theta - self.start
-        square = step @ self.fisher @ step / 2
-        return square + self.steep * square**2
-
-    def moved(self, function: Step) -> Tensor:
-        """Return Δ `[P]` of a reader's step; it may not change the vector that it was given."""
-        theta = self.start
-        after = function(
-            self.surrogate, self.mean_kl, theta, max_kl=MAX_KL, damping=DAMPING, cg_iters=CG_ITERS
-        )
-        if not torch.equal(theta, self.start):
-            raise ValueError("theta was changed in place: work on a copy, and return it")
-        return after.detach() - self.start
-
-
-def _problem(**shape: float) -> Problem:
-    """A problem whose curvature differs from direction to direction by a factor of a hundred."""
-    axes = torch.linalg.qr(torch.arange(16.0, dtype=torch.float64).reshape(4, 4).sin())[0]
-    curvature = torch.tensor([5.0, 1.0, 0.3, 0.05], dtype=torch.float64)
-    gradient = torch.tensor([0.6, -0.3, 0.5, 0.4], dtype=torch.float64)
-    return Problem(axes @ torch.diag(curvature) @ axes.T, gradient, **shape)
-
-
-def _round(**shape: float) -> Problem:
-    """A problem whose curvature is the same in all directions: any solver finds the direction."""
-    gradient = torch.tensor([0.6, -0.3, 0.5, 0.4], dtype=torch.float64)
-    return Problem(2 * torch.eye(SIZE, dtype=torch.float64), gradient, **shape)
-
-
-def _parallel(a: Tensor, b: Tensor) -> bool:
-    return bool(a @ b > (1 - 1e-8) * a.norm() * b.norm())
-
-
-def _direction(function: Step) -> str:
-    problem = _problem()
-    step = problem.moved(function)
-    if not step.any():
-        return "it does not move, although every short step uphill is allowed"
-    right = torch.linalg.solve(problem.damped, problem.gradient)
-    if _parallel(step, right):
-        return ""
-    known = {
-        "it walks downhill: the surrogate is to be made large": -right,
-        "that is the plain gradient: the curvature does not get into the product": problem.gradient,
-        "the damping is missing from the solve": torch.linalg.solve(problem.fisher, problem.gradient),
-        "that is the damped matrix times g: solve with it": problem.damped @ problem.gradient,
-    }
-    for diagnosis_, wrong in known.items():
-        if _parallel(step, wrong):
-            return diagnosis_
-    return "the step does not solve (F + cI) x = g: compare the solver with torch.linalg.solve"
-
-
-def _length(function: Step) -> str:
-    problem = _problem()
-    step = problem.moved(function)
-    spent = (step @ problem.damped @ step / 2).item()
-    undamped = (step @ problem.fisher @ step / 2).item()
-    without_root = (
-        2 * MAX_KL**2 / (problem.gradient @ torch.linalg.solve(problem.damped, problem.gradient)).item()
-    )
-
-    def near(a: float, b: float) -> bool:
-        return abs(a - b) < 1e-7 * MAX_KL
-
-    if near(spent, MAX_KL):
-        return ""
-    if near(spent, MAX_KL / 2):
-        return "½Δᵀ(F + cI)Δ is δ/2: there is a 2 under the root"
-    if near(undamped, MAX_KL) or near(4 * undamped, MAX_KL):  # rounding may have cost it one halving
-        return "½ΔᵀFΔ is δ: measure the length with the damped product, as the solve does"
-    if near((step @ step / 2).item(), MAX_KL):
-        return "the Euclidean length is √(2δ): measure with the damped product"
-    if near(spent, without_root):
-        return "the root is missing"
-    return f"½Δᵀ(F + cI)Δ is {spent / MAX_KL:.3g} δ, and should be δ"
-
-
-def _trust(function: Step) -> str:
-    for steep in (150.0, 950.0):  # the full step costs 3.7 and 18 δ, half of it 0.4 and 1.3 δ
-        problem = _round(steep=steep)
-        step = problem.moved(function)
-        if not step.any():
-            return "it gives up, although a shorter step of the same direction keeps KL ≤ δ: backtrack"
-        spent = problem.mean_kl(problem.start + step).item()
-        if spent > MAX_KL * (1 + 1e-9):
-            return (
-                f"the exact KL divergence is {spent / MAX_KL:.2g} δ: accept a length only where mean_kl itself, at the "
-                "new parameters, is at most δ"
-            )
-    return ""
-
-
-def _improvement(function: Step) -> str:
-    problem = _round(bend=8.0)
-    step = problem.moved(function)
-    if not step.any():
-        return "it gives up, although a shorter step of the same direction improves the surrogate: backtrack"
-    gain = problem.surrogate(problem.start + step).item()
-    if gain <= 0:
-        return f"the surrogate changed by {gain:.2g}: accept a length only if the surrogate goes up"
-    return ""
-
-
-def _refusal(function: Step) -> str:
-    step = _round(bend=1e9, steep=1e30).moved(function)
-    if step.any():
-        return "no length was acceptable, yet the parameters moved: return the old ones"
-    return ""
-
-
-CHECKS: Mapping[str, Callable[[Step], str]] = {
-    "direction": _direction,
-    "length": _length,
-    "trust": _trust,
-    "improvement": _improvement,
-    "refusal": _refusal,
-}
-"""By name, in the order in which they are run: what is wrong with a step, or nothing."""
+__all__ = [
+    "conjugate_gradient",
+    "diagnosis",
+    "line_search",
+    "natural_step",
+    "trpo_step",
+    "update",
+]
 
 
 def trpo_step(function: Step) -> Judgement:
     """A policy step of TRPO, by the named checks.
 
     Args:
-        function: the reader's ``trpo_step(surrogate, mean_kl, theta, max_kl, damping, cg_iters)``; it maps two
-            functions of the parameters and the parameters `[P]` to new parameters.
+        function: the reader's ``trpo_step(gain, mean_kl, weights, max_kl, damping)``; it moves the weights, a list of
+            tensors, and ``gain()`` and ``mean_kl()`` look at them.
 
     Example:
-        >>> trpo_step(lambda surrogate, mean_kl, theta, **numbers: theta)
+        >>> trpo_step(lambda gain, mean_kl, weights, **numbers: None)
         ✗ not yet: <lambda>: check "direction": it does not move, although every short step uphill is allowed
     """
-    problem = _problem()
 
     def answered() -> bool:
-        answer = function(problem.surrogate, problem.mean_kl, problem.start, max_kl=MAX_KL, damping=DAMPING,
-                          cg_iters=CG_ITERS)  # fmt: skip
-        return isinstance(answer, Tensor)
+        posed = problem()
+        weights = posed.weights()
+        return function(*posed.of(weights), weights, max_kl=MAX_KL, damping=DAMPING) is not ...
 
     return judge_by_checks(function, CHECKS, answered, fallback="your step")
 
@@ -222,7 +56,7 @@ def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Judgemen
         steps: the broken steps, under the same names.
 
     Example:
-        >>> diagnosis({1: "length"}, {1: lambda surrogate, mean_kl, theta, **numbers: theta})
+        >>> diagnosis({1: "length"}, {1: lambda gain, mean_kl, weights, **numbers: None})
         ✗ not yet: diagnosis: TRPO 1: it gets as far as "length"? It is stopped before that
     """
     return judge_diagnosis(
@@ -235,67 +69,197 @@ def diagnosis(answers: Mapping[Any, Any], steps: Mapping[Any, Step]) -> Judgemen
     )
 
 
-def linear_fisher_product(function: Callable[..., Any]) -> Judgement:
-    """F v for a Gaussian policy with location W φ(s) and one free log σ per action dimension.
+def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
+    """Conjugate gradients: the best point of the Krylov space after two steps, the solution after all.
 
     Args:
-        function: the reader's ``linear_fisher_product(features, log_scale, v_weight, v_log_scale)`` of arrays
-            `[B, K]`, `[A]`, `[A, K]`, `[A]`; it returns the two blocks of F v, `[A, K]` and `[A]`.
+        function: the reader's ``conjugate_gradient(product, b, iterations)``.
 
     Example:
-        >>> linear_fisher_product(lambda *arguments: ...)
+        >>> conjugate_gradient(lambda product, b, iterations: b)
+        ✗ not yet: <lambda>: that is b itself: nothing is solved
+    """
+    posed = problem()
+    matrix, b = posed.damped, posed.gradient
+
+    def best(k: int) -> Tensor:  # by the theorem: nearest to the solution in the matrix's own norm
+        space = torch.stack([torch.linalg.matrix_power(matrix, i) @ b for i in range(k)], 1)
+        return space @ torch.linalg.solve(space.T @ matrix @ space, space.T @ b)
+
+    def walk(
+        k: int, beta: Callable[..., Any], shrink: Callable[[Tensor, Tensor], Tensor] | None = None
+    ) -> Tensor:
+        x, residual, direction = torch.zeros_like(b), b, b
+        for _ in range(k):
+            image, square = matrix @ direction, residual @ residual
+            x = x + square / (direction @ image) * direction
+            length = square / (direction @ image)
+            residual = residual - length * (shrink(image, direction) if shrink else image)
+            direction = residual + beta(residual @ residual, square, length) * direction
+        return x
+
+    def case(k: int) -> Case:
+        mistakes = {
+            "that is b itself: nothing is solved": b,
+            "the new direction forgets the old one: that is steepest descent, β is missing": walk(
+                k, lambda new, old, length: 0
+            ),
+            "β is 1: the squared residual was overwritten before β was computed from it": walk(
+                k, lambda new, old, length: 1
+            ),
+            "β is upside down: the new squared residual over the old one": walk(
+                k, lambda new, old, length: old / new
+            ),
+            "the old direction is weighed by the two squared residuals, new over old, not by the step's length": walk(
+                k, lambda new, old, length: length
+            ),
+            "the residual falls by the length times the *image* of the direction, not the direction": walk(
+                k, lambda new, old, length: new / old, lambda image, direction: direction
+            ),
+            "the number of iterations is not used": best(4 if k == 2 else 2),
+            "the sign is wrong: it solves for −b": -best(k),
+            "that is the residual: return x": b - matrix @ best(k),
+        }
+        return Case(
+            (lambda v: matrix @ v, b, k),
+            best(k),
+            mistakes,
+            hint="it is not the point of the Krylov space nearest to the solution",
+        )
+
+    easy = torch.ones(3, dtype=torch.float64)
+    done = {"when the residual has vanished, the next step divides 0 by 0: stop before": easy * torch.nan}
+    cases = [case(1), case(2), case(4), Case((lambda v: 2 * v, easy, 5), easy / 2, done)]
+    return judge_cases(function, cases, "right: nearest in the Krylov space, and it stops when it is done")
+
+
+def natural_step(function: Callable[..., Any]) -> Judgement:
+    """The full step √(2D / xᵀ(F + cI)x) x with (F + cI) x = b, from the surrogate and the divergence.
+
+    Args:
+        function: the reader's ``natural_step(gain, mean_kl, weights, max_kl, damping)``; it returns a vector `[P]`
+            and leaves the weights alone.
+
+    Example:
+        >>> natural_step(lambda *arguments: ...)
         … not answered: <lambda>: write it, and run this cell again
     """
-
-    def joined(*arguments: Any) -> Any:
-        answer = function(*arguments)
-        if answer is ... or answer is None:
-            return answer
-        weight, log_scale = detached(tuple(answer))
-        return _join(weight, log_scale)
-
-    joined.__name__ = getattr(function, "__name__", "linear_fisher_product")
-    rng = np.random.default_rng(0)
-    cases = [_linear_case(rng, *sizes) for sizes in ((7, 3, 2), (4, 5, 1))]
-    return judge_cases(joined, cases, "right: the Hessian of the mean KL divergence, without a Hessian")
-
-
-def _linear_case(rng: np.random.Generator, states: int, features: int, act_dim: int) -> Case:
-    phi, log_scale = rng.normal(size=(states, features)), rng.normal(size=act_dim)
-    v, u = rng.normal(size=(act_dim, features)), rng.normal(size=act_dim)
-    weight, log = _hessian_product(phi, log_scale, v, u)
-    scale, second = np.exp(log_scale), phi.T @ phi / states
+    posed = problem()
+    right, weights = posed.full(), posed.weights()
+    x, plain = torch.linalg.solve(posed.damped, posed.gradient), posed.gradient
+    undamped = torch.linalg.solve(posed.fisher, posed.gradient)
     mistakes = {
-        "the curvature of log σ is 2, whatever σ is": _join(weight, u),
-        "the curvature of log σ is 2; 2/σ² is that of σ": _join(weight, 2 * u / scale**2),
-        "the location's block is divided by σ², not σ": _join(weight * scale[:, None], log),
-        "the location's block is *divided* by σ²": _join(weight * scale[:, None] ** 4, log),
-        "that is a sum over states in the location's block: take the mean": _join(states * weight, log),
-        "the features of one state meet each other: φφᵀ, not φ²": _join(
-            v * np.diag(second) / scale[:, None] ** 2, log
-        ),
-        "E[φ]E[φ]ᵀ is not E[φφᵀ]: average the outer products": _join(
-            v @ np.outer(phi.mean(0), phi.mean(0)) / scale[:, None] ** 2, log
-        ),
+        "½ xᵀ(F + cI)x is max_kl/2: there is a 2 under the root": right / 2**0.5,
+        "the root is missing": 2 * MAX_KL / (x @ plain) * x,
+        "that is x: give it the length √(2 max_kl / xᵀ(F + cI)x)": x,
+        "the Euclidean length is √(2 max_kl): measure with the damped product": (2 * MAX_KL / (x @ x)).sqrt()
+        * x,
+        "it walks downhill: the surrogate is to be made large": -right,
+        "measure the length with the damped product, as the solve does": (
+            2 * MAX_KL / (x @ posed.fisher @ x)
+        ).sqrt()
+        * x,
+        "the damping is missing": (2 * MAX_KL / (undamped @ plain)).sqrt() * undamped,
+        "that is the plain gradient: the curvature does not get into the product": (
+            2 * MAX_KL / (plain @ plain) / DAMPING
+        ).sqrt()
+        * plain,
+        "that is the plain gradient, with the length of the damped product": (
+            2 * MAX_KL / (plain @ posed.damped @ plain)
+        ).sqrt()
+        * plain,
     }
-    return Case((phi, log_scale, v, u), _join(weight, log), mistakes)
+    hint = "½ xᵀ(F + cI)x = max_kl and (F + cI) x ∥ b do not both hold"
+    case = Case((*posed.of(weights), weights, MAX_KL, DAMPING), right, mistakes, hint)
+    verdict = judge_cases(function, [case], "right: direction and length are those of dense algebra")
+    if verdict.passed and not torch.equal(parameters_to_vector(weights).detach(), posed.start):
+        return Judgement(
+            verdict.exercise, False, "the weights have moved: that is the line search's business"
+        )
+    return verdict
 
 
-def _hessian_product(
-    phi: np.ndarray, log_scale: np.ndarray, v: np.ndarray, u: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """F v by two backward passes over torch's divergence: not the formula that the reader is asked for."""
-    features, v_weight, v_log = (torch.tensor(x) for x in (phi, v, u))
-    weight = torch.zeros_like(v_weight, requires_grad=True)
-    log = torch.tensor(log_scale, requires_grad=True)
-    new = Normal(features @ weight.T, log.exp())
-    old = Normal(new.loc.detach(), new.scale.detach())
-    kl = kl_divergence(old, new).sum(1).mean()
-    slope = torch.autograd.grad(kl, (weight, log), create_graph=True)
-    along = (slope[0] * v_weight).sum() + (slope[1] * v_log).sum()
-    first, second = torch.autograd.grad(along, (weight, log))
-    return first.numpy(), second.numpy()
+def line_search(function: Callable[..., Any]) -> Judgement:
+    """The longest of full, full/2, full/4, … that keeps both promises, by the checks *trust*, *improvement*, *refusal*.
+
+    Args:
+        function: the reader's ``line_search(gain, mean_kl, weights, full, max_kl)``, which moves the weights.
+
+    Example:
+        >>> line_search(lambda *arguments: None)
+        ✗ not yet: <lambda>: check "length": the full step keeps both promises, and is to be taken
+    """
+
+    def step(gain: Any, mean_kl: Any, weights: Sequence[Tensor], max_kl: float, damping: float) -> Any:
+        slope = torch.cat([each.flatten() for each in torch.autograd.grad(gain(), weights)])
+        full = (
+            (2 * max_kl / (2 + damping)) ** 0.5 * slope / slope.norm()
+        )  # the curvature of `round_problem` is 2
+        return function(gain, mean_kl, weights, full, max_kl)
+
+    def whole(function: Step) -> str:
+        posed = round_problem()
+        if parallel(posed.moved(function), posed.full()) and torch.allclose(
+            posed.moved(function), posed.full(), rtol=1e-6
+        ):
+            return ""
+        return "the full step keeps both promises, and is to be taken"
+
+    def answered() -> bool:
+        posed = round_problem()
+        weights = posed.weights()
+        return step(*posed.of(weights), weights, MAX_KL, DAMPING) is not ...
+
+    step.__name__ = getattr(function, "__name__", "line_search")
+    checks = {"length": whole} | {name: CHECKS[name] for name in ("trust", "improvement", "refusal")}
+    return judge_by_checks(step, checks, answered)
 
 
-def _join(weight: Any, log_scale: Any) -> np.ndarray:
-    return np.concatenate([np.ravel(np.asarray(weight, float)), np.ravel(np.asarray(log_scale, float))])
+def update(function: Callable[..., Any]) -> Judgement:
+    """A whole update: where it takes the weights of both networks, beside the package.
+
+    Args:
+        function: the reader's ``update(policy, critic, adam, batch, max_kl, passes, size)``, which changes the networks
+            in place; it shuffles with `torch.randperm`, once a pass.
+
+    Example:
+        >>> update(lambda *arguments, **options: None)
+        … not answered: <lambda>: the weights have not moved: write it, and run this cell again
+    """
+    name, small = getattr(function, "__name__", "your function"), Small()
+    before = small.weights()
+    torch.manual_seed(SEED)
+    try:
+        function(small.policy, small.critic, small.adam(TRPO), small.batch, max_kl=0.01, passes=3, size=16)
+    except Exception as error:
+        return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
+    after, right = small.weights(), small.after_the_packages(TRPO)
+    if torch.equal(before, after):
+        return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
+    split = sum(p.numel() for p in small.policy.net.parameters())
+    same = [
+        torch.allclose(a, b, rtol=1e-6, atol=1e-8)
+        for a, b in ((after[:split], right[:split]), (after[split:], right[split:]))
+    ]
+    still = [torch.equal(after[:split], before[:split]), torch.equal(after[split:], before[split:])]
+    if all(same):
+        return Judgement(name, True, "its weights are the package's, of the policy and of the critic")
+    if still[0]:
+        return Judgement(name, False, "the policy has not moved: natural_step, then line_search")
+    if still[1]:
+        return Judgement(
+            name, False, "the critic has not learned: passes of `step` over shuffled minibatches"
+        )
+    if not same[0]:
+        hints = (
+            "are the advantages normalised over the whole batch? is the old policy detached? does the value regression "
+            "leave it alone?"
+        )
+        return Judgement(name, False, f"the policy ends elsewhere than the package's: {hints}")
+    hints = (
+        "is torch.randperm called once a pass, and for nothing else? is the target the reward to go, the loss its mean "
+        "squared error?"
+    )
+    return Judgement(
+        name, False, f"the policy is right; the critic ends elsewhere than the package's: {hints}"
+    )

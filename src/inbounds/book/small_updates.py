@@ -1,0 +1,196 @@
+"""One update of small networks: by a reader's program, by the package, and with each of the known mistakes.
+
+The graders of *PPO* and *TRPO* give a reader's ``update`` the networks and the steps of a `Small`, and compare where
+the weights end.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.distributions import Normal, kl_divergence
+
+from inbounds.learning import (
+    ActorCritic,
+    NetworkConfig,
+    Policy,
+    PolicyConfig,
+    PPOConfig,
+    Rollout,
+    TRPOConfig,
+    ppo,
+    trpo,
+)
+
+__all__ = ["PPO", "SEED", "TRPO", "Batch", "Small", "SmallPolicy"]
+
+Batch = namedtuple("Batch", "obs latent reward terminated truncated next_obs")
+"""The steps of a rollout, a column each, as the growing program keeps them."""
+SEED = 8
+"""Of torch's generator, which shuffles."""
+OBS, ACT, STEPS = 3, 2, 64
+PPO = PPOConfig(
+    horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.05, clip_range=0.1
+)
+TRPO = TRPOConfig(horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.0)
+
+
+class SmallPolicy:
+    """A Gaussian policy as the growing program has one."""
+
+    def __init__(self, net: nn.Sequential) -> None:
+        self.net = net
+
+    def _law(self, outputs: Tensor) -> Normal:
+        loc, log_scale = outputs.chunk(2, -1)
+        return Normal(loc, log_scale.clamp(-10, 1).exp())
+
+    def log_prob(self, obs: Tensor, latent: Tensor) -> Tensor:
+        """Return log-densities `[B]` of latents `[B, A]`."""
+        return self._law(self.net(obs)).log_prob(latent).sum(-1)
+
+    def entropy(self, obs: Tensor) -> Tensor:
+        """Return entropies `[B]`, in nats."""
+        return self._law(self.net(obs)).entropy().sum(-1)
+
+    def kl(self, old_outputs: Tensor, obs: Tensor) -> Tensor:
+        """Return KL(old‖new) `[B]` for old outputs `[B, 2A]`, in nats."""
+        return kl_divergence(self._law(old_outputs), self._law(self.net(obs))).sum(-1)
+
+
+class _Orders:
+    """A generator of the package's shuffles that draws them as a reader's program does."""
+
+    def permutation(self, length: int) -> np.ndarray:
+        return torch.randperm(length).numpy()
+
+
+class Small:
+    """Networks of one seed, and steps that their policy drew.
+
+    Example:
+        >>> small = Small()
+        >>> before = small.weights()
+        >>> moved = small.after_the_packages(TRPO)
+        >>> before.shape == moved.shape, bool((before == moved).all())
+        (True, False)
+    """
+
+    def __init__(self) -> None:
+        policy = Policy(PolicyConfig("gaussian"), -np.ones(ACT), np.ones(ACT))
+        network = NetworkConfig(hidden_sizes=(8, 8), dtype="float64", policy_head_gain=0.5)
+        self.networks = ActorCritic(policy, OBS, network, [torch.Generator().manual_seed(3)])
+        actor, critic = map(_plain, self.networks.networks)
+        self.policy, self.critic = SmallPolicy(actor), nn.Sequential(critic, nn.Flatten(0))
+        self.batch = self._steps()
+
+    def _steps(self) -> Batch:
+        generator = torch.Generator().manual_seed(9)
+        obs, next_obs = torch.randn(2, STEPS, OBS, generator=generator, dtype=torch.float64)
+        noise = torch.randn(STEPS, ACT, generator=generator, dtype=torch.float64)
+        reward = 2 * torch.randn(STEPS, generator=generator, dtype=torch.float64) + 1
+        ends = torch.zeros(2, STEPS, dtype=torch.float64)
+        ends[0, [10, 40]], ends[1, [25]] = 1.0, 1.0
+        next_obs[:-1] = torch.where(ends.sum(0)[:-1, None] > 0, next_obs[:-1], obs[1:])
+        with torch.no_grad():
+            loc, log_scale = self.policy.net(obs).chunk(2, -1)
+        latent = loc + log_scale.exp() * noise
+        return Batch(obs, latent, reward, ends[0], ends[1], next_obs)
+
+    def adam(self, config: PPOConfig | TRPOConfig) -> torch.optim.Adam:
+        """Return one Adam over both networks."""
+        weights = [*self.policy.net.parameters(), *self.critic.parameters()]
+        return torch.optim.Adam(weights, config.learning_rate, eps=config.adam_eps)
+
+    def weights(self) -> Tensor:
+        """Return all weights `[P]`: the policy's, then the critic's."""
+        networks = self.policy.net, self.critic
+        return torch.cat([p.detach().flatten().clone() for net in networks for p in net.parameters()])
+
+    def rollout(self) -> Rollout:
+        """Return the steps as the package keeps them."""
+        obs, latent, reward, terminated, truncated, next_obs = (column[None] for column in self.batch)
+        cut = truncated.bool()
+        cut[:, -1] |= ~terminated[:, -1].bool()
+        with torch.no_grad():
+            parameters = self.networks.parameters(obs)
+            value, after = self.networks.values(obs), self.networks.values(next_obs)
+            log_prob = self.networks.policy.law.log_prob(parameters, latent)
+        return Rollout(
+            obs=obs,
+            latent=latent,
+            action=latent,
+            reward=reward,
+            terminated=terminated.bool(),
+            truncated=truncated.bool(),
+            bootstrap=torch.where(cut, after, 0.0),
+            value=value,
+            log_prob=log_prob,
+            parameters=parameters,
+            saturation=np.zeros(1),
+            action_std=np.ones(1),
+            episode_returns=[[]],
+        )
+
+    def after_the_packages(self, config: PPOConfig | TRPOConfig) -> Tensor:
+        """Return the weights `[P]` after the package's update, of PPO or of TRPO; these networks stay as they are."""
+        algorithm: Any = ppo if isinstance(config, PPOConfig) else trpo
+        networks, rollout = Small().networks, self.rollout()
+        torch.manual_seed(SEED)
+        algorithm.update(networks, algorithm.make_optimizer(networks, config), rollout, [_Orders()], config)
+        return torch.cat([p.detach().flatten() for net in networks.networks for p in net.parameters])
+
+    def after_a_flawed(self, flaw: str) -> Tensor:
+        """Return the weights `[P]` after PPO's update with one mistake; the networks are moved.
+
+        Args:
+            flaw: a key of `inbounds.book.exercises.ppo.MISTAKES`' values; "" is none.
+        """
+        advantage, to_go = (each[0] for each in self.rollout().advantages(PPO.gamma, PPO.gae_lambda))
+        clip_range = 0.2 if flaw in ("clip range", "no coefficients") else PPO.clip_range
+        bonus = {"no bonus": 0.0, "no coefficients": 1e-4}.get(flaw, PPO.entropy_coef)
+        old, adam = self.policy.log_prob(self.batch.obs, self.batch.latent).detach(), self.adam(PPO)
+        if flaw == "whole":
+            advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        torch.manual_seed(SEED)
+        order = torch.randperm(STEPS)
+        for number in range(1 if flaw == "one pass" else 3):
+            if number and flaw != "one order":
+                order = torch.randperm(STEPS)
+            for index in order.split(16):
+                obs, latent, a = self.batch.obs[index], self.batch.latent[index], advantage[index]
+                if flaw not in ("raw", "whole"):
+                    a = (a - a.mean()) / (a.std() + 1e-8)
+                log_prob = self.policy.log_prob(obs, latent)
+                ratio = (log_prob - (log_prob.detach() if flaw == "own density" else old[index])).exp()
+                gain = torch.minimum(ratio * a, a + clip_range * a.abs()).mean()
+                error = (1.0 if flaw == "value coef" else 0.5) * (
+                    self.critic(obs) - to_go[index]
+                ).square().mean()
+                if flaw != "accumulate":
+                    adam.zero_grad()
+                (error - gain - bonus * self.policy.entropy(obs).mean()).backward()
+                self._clip(flaw)
+                adam.step()
+        return self.weights()
+
+    def _clip(self, flaw: str) -> None:
+        both = [*self.policy.net.parameters()], [*self.critic.parameters()]
+        for weights in both if flaw == "apart" else () if flaw == "free" else ([*both[0], *both[1]],):
+            nn.utils.clip_grad_norm_(weights, 0.5)
+
+
+def _plain(net: Any) -> nn.Sequential:
+    """The one seed of an `Mlp` as torch's own layers."""
+    layers: list[nn.Module] = []
+    for layer in net.layers:
+        size_out, size_in = layer.weight.shape[1:]
+        linear = nn.Linear(size_in, size_out).double()
+        linear.weight.data.copy_(layer.weight[0])
+        linear.bias.data.copy_(layer.bias[0, :, 0])
+        layers += [linear, nn.Tanh()]
+    return nn.Sequential(*layers[:-1])
