@@ -28,7 +28,7 @@ REFERENCE_PAGES = {
     "errata",
     # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
     # here the page must show every claim (`test_the_ledger_is_generated`).
-    "claims_ledger",
+    "claim_by_claim",
     # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in
     # a cell and end in a project (`test_every_road_is_tried`).
     "what_next",
@@ -115,7 +115,7 @@ def test_every_erratum_is_checked() -> None:
 
 def test_the_ledger_is_generated() -> None:
     """The page shows the table of all claims, and says in words what a verdict is."""
-    cells = nbformat.read(ROOT / "notebooks" / "claims_ledger.ipynb", as_version=4).cells
+    cells = nbformat.read(ROOT / "notebooks" / "claim_by_claim.ipynb", as_version=4).cells
     code = [cell.source for cell in cells if cell.cell_type == "code"]
     prose = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
     assert any("study_pages.findings(outcomes)" in source for source in code)

@@ -410,6 +410,7 @@ def test_what_is_computed_on_the_spot_is_decided(shipped: Outcomes) -> None:
     del verdicts["fisher-time"]
     assert verdicts == {
         "start-cause": "refuted",
+        "start-cause-drawn": "supported",
         "kl": "supported",
         "fisher-error": "supported",
         "beta-hessian": "refuted",

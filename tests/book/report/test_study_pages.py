@@ -16,13 +16,13 @@ from inbounds.book.report.words import pair_name
 from inbounds.study import analysis, select
 from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
-from inbounds.study.ledger import CLAIMS, claims_named, judge
+from inbounds.study.ledger import CLAIMS, claims_named, judge, quotes
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.words import spoken, verdict
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
-CHEAP = claims_named(["wins-ppo-standard", "start-raw", "clip", "centres"])
+CHEAP = claims_named(["wins-ppo-standard", "start-raw", "clip", "beta-hessian", "centres"])
 
 
 @pytest.fixture(scope="module")
@@ -161,15 +161,21 @@ def test_published_scores_are_largest_points_of_mean_curves() -> None:
 def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) -> None:
     found = [judge(some, claim) for claim in CHEAP]
     rows = cells(study_pages.ledger(found))
-    assert [row[1].partition("\n")[0] for row in rows] == [each.verdict.upper() for each in found]
+    assert [row[1].partition("\n")[0] for row in rows] == [quotes.verdict(each).upper() for each in found]
+    assert rows[-1][1].startswith("NOT TESTED\nJudged anew: ")
     (wins,) = [row for row in rows if row[0].endswith("\ninbounds study ledger wins-ppo-standard")]
+    assert wins[0].startswith("“In the four environments both in PPO and TRPO")
     _, _, behind, _, hopper, ant, missing = wins[1].split("\n")
     assert behind == "cells: 4 of 12; listed in the protocol"
     assert hopper.startswith("Hopper: ")
     assert ant.startswith("Ant: ")
     assert missing == "missing: HalfCheetah, Swimmer, Walker2d, Humanoid"
-    assert ledger_table.counted(found) in study_pages.ledger(found).html
-    assert "1 refuted" in ledger_table.counted(found)
+    thesis, own = quotes.thesis_and_book(found)
+    for whose, part in (("The thesis's claims", thesis), ("This book's own", own)):
+        assert (
+            f"{whose}: {ledger_table.counted(part)}".replace("'", "&#39;") in study_pages.ledger(found).html
+        )
+    assert "1 refuted, 1 undecided, 1 not tested" in ledger_table.counted(thesis)
     assert ledger_table.counted(found[:1]).startswith("1 claim: ")
     assert "Refuted: " in study_pages.decided(found).html
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
 from inbounds.study.ledger import CLAIMS, Finding, judge
+from inbounds.study.ledger.quotes import NOT_TESTED, quote, thesis_and_book, verdict
 from inbounds.study.ledger.verdicts import STAYS
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics.settings import LEVEL
@@ -35,14 +36,32 @@ def ledger(found: Sequence[Finding]) -> Shown:
     """
     rows = [
         [
-            f"{each.claim.says}\n({each.claim.where})\n{each.claim.command}",
-            f"{each.verdict.upper()}\n{each.counted}\ncells: {each.cells}; {each.claim.standing}\n"
+            f"{_words(each)}{each.claim.says}\n({each.claim.where})\n{each.claim.command}",
+            f"{verdict(each).upper()}\n{_why_not(each)}{each.counted}\ncells: {each.cells}; {each.claim.standing}\n"
             f"Test: {each.claim.test}\n{each.told}",
         ]
         for each in found
     ]
     claims = html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))
-    return html.of_study("the ledger", html.paragraph(counted(found)), claims)
+    thesis, book = thesis_and_book(found)
+    tallies = [
+        html.paragraph(f"{whose}: {counted(part)}")
+        for whose, part in (("The thesis's claims", thesis), ("This book's own", book))
+        if part
+    ]
+    return html.of_study("the ledger", *tallies, claims)
+
+
+def _words(finding: Finding) -> str:
+    """Return the thesis's own words with their place, as a line; nothing for a row of this book's own."""
+    said = quote(finding.claim)
+    return f"“{said.words}” ({said.place})\n" if said else ""
+
+
+def _why_not(finding: Finding) -> str:
+    """Return why a row does not test the thesis's sentence, as a line; nothing where it does."""
+    reason = NOT_TESTED.get(finding.claim.id)
+    return f"Judged anew: {reason}. Before: {finding.verdict}.\n" if reason else ""
 
 
 def counted(found: Sequence[Finding]) -> str:
@@ -52,10 +71,15 @@ def counted(found: Sequence[Finding]) -> str:
         >>> counted([])
         '0 claims: 0 supported, 0 refuted, 0 undecided.'
     """
-    verdicts = Counter(each.verdict for each in found)
-    told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in ("supported", "refuted", "undecided"))
-    stay = sum(each.outlook == STAYS for each in found)
-    rest = f", of which {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives" if stay else ""
+    verdicts = Counter(map(verdict, found))
+    words = ("supported", "refuted", "undecided", *(["not tested"] if verdicts["not tested"] else []))
+    told = ", ".join(f"{verdicts[word]} {word}" for word in words)
+    stay = sum(each.outlook == STAYS for each in found if verdict(each) == "undecided")
+    rest = (
+        f"; of the undecided {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives"
+        if stay
+        else ""
+    )
     return f"{len(found)} claim{'' if len(found) == 1 else 's'}: {told}{rest}."
 
 
@@ -64,7 +88,7 @@ def decided(found: Sequence[Finding]) -> Shown:
     told = [
         f"{each.verdict.capitalize()}: {each.claim.says} ({', '.join(each.told.splitlines())})"
         for each in found
-        if each.verdict != "undecided"
+        if verdict(each) in ("supported", "refuted")
     ]
     return html.of_study(
         "what is decided", html.bullets(told) if told else html.missing("No claim is decided yet.")

@@ -139,6 +139,24 @@ def loud_starts(robots: Sequence[str]) -> Evidence:
     return find
 
 
+def bill_of_leaving(robot: str) -> Evidence:
+    """Of the deficit of untrained Gaussians charged as drawn, at least half is the bill for leaving the box.
+
+    The bill is what they earn more where actions are clipped before the reward sees them; the motion is the same.
+    """
+
+    def find(_: Outcomes) -> list[Statement]:
+        logit_normal, clipped = (untrained(family, robot) for family in ("logit-normal", "gaussian"))
+        drawn = untrained("gaussian", robot, mode="raw")
+        return [
+            half_left(
+                robot, [clipped, drawn], [logit_normal, drawn], ("bill", robot), claimed=True, one_base=True
+            )
+        ]
+
+    return find
+
+
 def sampled_error(_: Outcomes) -> list[Statement]:
     """State that the sampled Fisher-vector product is off: its relative error, over seeds. For: above `OFF`."""
     error = _over(_fisher_routes()[0], "error")

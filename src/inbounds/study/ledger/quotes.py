@@ -1,0 +1,158 @@
+"""The thesis's own words behind each row of the ledger, and the rows that were judged anew (`results/JUDGED-ANEW.md`).
+
+A row counts in the thesis's tally if a sentence of the thesis makes the claim, and if the sentence is judged as
+strongly, and under the conditions, as it is meant. All other rows count in a tally of this book's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from inbounds.study.ledger.verdicts import Claim, Finding
+
+
+@dataclass(frozen=True)
+class Quote:
+    """A sentence, or part of one.
+
+    Example:
+        >>> QUOTES["overall"].place
+        'chapter 7'
+    """
+
+    words: str
+    """As they are printed."""
+    place: str
+    """Chapter or section."""
+
+
+_FOUR = Quote(
+    "In the four environments both in PPO and TRPO, the Logitnormal policy led the highest performance as Beta policy "
+    "did.",
+    "chapter 6",
+)
+_CAUSE = Quote(
+    "The performance starts at relatively low score before training because they have a high probability to select the "
+    "actions out of the boundary.",
+    "chapter 6",
+)
+_FISHER = Quote(
+    "Usually the latter way is better because it only depends on the states, not on the actions, and is "
+    "computationally efficient in the large-scale setting",
+    "section 2.3",
+)
+_LARGE = Quote(
+    "The drawback of Beta distribution and Logitnormal distribution is that the parameters scale becomes large in some "
+    "cases.",
+    "chapter 6",
+)
+QUOTES: Mapping[str, Quote] = MappingProxyType(
+    {
+        "start": Quote(
+            "What can be clearly seen in this plot is that Gaussian policy started its performance much lower than the "
+            "others.",
+            "chapter 5",
+        ),
+        "start-cause": _CAUSE,
+        "start-cause-drawn": _CAUSE,
+        "wins-ppo": _FOUR,
+        "wins-trpo": _FOUR,
+        "wins-beta": _FOUR,
+        "overall": Quote(
+            "In the experiments on MuJoCo simulation, Logitnormal policy generally surpasses Gaussian policy.",
+            "chapter 7",
+        ),
+        "faster": Quote(
+            "Specifically, in HalfCheetah-v2 and Humanoid-v2, Logitnormal policy trained faster than the other two "
+            "distributions.",
+            "chapter 5",
+        ),
+        "ties": Quote(
+            "In Hopper-v2, Walker2d-v2 and Ant-v2, all three distributions performed well with tiny differences.",
+            "chapter 5",
+        ),
+        "trpo-named": Quote(
+            "In Walker2d-v2, Ant, HalfCheetah and Humanoid-v2, Logitnormal policy surpassed Gaussian policy greatfully "
+            "and underperformed in the rest of two environments.",
+            "chapter 5",
+        ),
+        "swimmer": Quote(
+            "However, in Swimmer-v2, Gaussian policy outperformed the other two distributions after around 80 "
+            "iterations.",
+            "chapter 5",
+        ),
+        "cause-noise": Quote(
+            "The boundary effect is solved by Logitnormal distribution with the help of the fact that it is supported "
+            "on the bound.",
+            "chapter 6",
+        ),
+        "beta-entropy": Quote(
+            "This is essential for Beta policy since it has no scale parameter to clip.", "chapter 4"
+        ),
+        "large-logit-normal": _LARGE,
+        "large-beta": _LARGE,
+        "kl": Quote(
+            "Logitnormal distribution has the same KL-divergence as Gaussian distribution, which contributes to "
+            "enabling TRPO.",
+            "chapter 7",
+        ),
+        "fisher-error": _FISHER,
+        "fisher-time": _FISHER,
+        "beta-hessian": Quote(
+            "Beta policy has its limit to calculate Hessian of KL-divergence analytically due to numerical problem "
+            "with digamma function which is one of the components of the formula.",
+            "chapter 4",
+        ),
+        "beta-trpo": Quote("since it is difficult to calculate KL-divergence of Beta policy", "chapter 5"),
+        "centres": Quote(
+            "Since it turned out that obtaining mode and mean in a closed-form is impossible, the numerical method is "
+            "the only to get those.",
+            "chapter 6",
+        ),
+    }
+)
+"""Row → the sentence that makes the claim; rows of both presets share one, under the name without the preset."""
+
+NOT_TESTED: Mapping[str, str] = MappingProxyType(
+    {
+        "fisher-time": "the thesis speaks of the large-scale setting, and small networks were timed (rule 2)",
+        "beta-trpo": "the thesis says difficult, which a run that works does not refute (rule 3)",
+        "centres": "the thesis says that there is no closed form, and this book's methods are numerical (rule 3)",
+    }
+)
+"""Row → why the run does not test the thesis's sentence."""
+
+
+def quote(claim: Claim) -> Quote | None:
+    """Return the thesis's words behind a row; None for a row that is this book's own.
+
+    Example:
+        >>> from inbounds.study.ledger import claims_named
+        >>> quote(claims_named(["start-raw"])[0]) is None
+        True
+    """
+    return QUOTES.get(claim.id) or QUOTES.get(claim.id.removesuffix("-printed").removesuffix("-standard"))
+
+
+def verdict(finding: Finding) -> str:
+    """Return supported, refuted, undecided or not tested.
+
+    Example:
+        >>> from inbounds.study.ledger import Finding, claims_named
+        >>> verdict(Finding(claims_named(["beta-trpo"])[0], (), 0, 0))
+        'not tested'
+    """
+    return "not tested" if finding.claim.id in NOT_TESTED else finding.verdict
+
+
+def thesis_and_book(found: Sequence[Finding]) -> tuple[list[Finding], list[Finding]]:
+    """Return the rows that quote the thesis, and this book's own.
+
+    Example:
+        >>> thesis_and_book([])
+        ([], [])
+    """
+    thesis = [each for each in found if quote(each.claim) is not None]
+    return thesis, [each for each in found if each not in thesis]
