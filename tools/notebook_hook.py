@@ -10,6 +10,7 @@ import argparse
 import ast
 import re
 import sys
+from collections import Counter
 from pathlib import Path
 
 import nbformat
@@ -42,7 +43,7 @@ def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 def complaints(notebook: nbformat.NotebookNode) -> list[str]:
     """Return what keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
-    found, expected = unknown_values(notebook), 1
+    found, expected = [*unknown_values(notebook), *glued_twice(notebook)], 1
     for number, cell in enumerate(notebook.cells):
         if cell.cell_type != "code" or not cell.source.strip():
             continue
@@ -77,6 +78,17 @@ def glued(notebook: nbformat.NotebookNode) -> dict[str, str]:
         for output in cell.get("outputs", [])
         if "scrapbook" in output.get("metadata", {})
     }
+
+
+def glued_twice(notebook: nbformat.NotebookNode) -> list[str]:
+    """Return which names are glued more than once: the build warns of it, and its warnings are errors."""
+    names = [
+        output.metadata["scrapbook"]["name"]
+        for cell in notebook.cells
+        for output in cell.get("outputs", [])
+        if "scrapbook" in output.get("metadata", {})
+    ]
+    return [f"glues {name!r} {count} times" for name, count in Counter(names).items() if count > 1]
 
 
 def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:

@@ -241,6 +241,17 @@ def test_the_hook_sees(tmp_path: Path, plant, complaint: str, capsys: pytest.Cap
     assert complaint in capsys.readouterr().out
 
 
+def test_the_hook_sees_a_name_that_is_glued_twice(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    notebook = small_notebook(tmp_path)
+    glued = {"scrapbook": {"name": "answer"}}
+    for _ in range(2):
+        output = nbformat.v4.new_output("display_data", {"text/plain": "42"}, metadata=glued)
+        notebook.cells[1].outputs.append(output)
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == 1
+    assert "glues 'answer' 2 times" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_a_broken_notebook_fails_the_build(tmp_path: Path) -> None:
     """Jupyter Book exits 0 over a failing notebook unless told otherwise; our configuration tells it."""
