@@ -2,12 +2,17 @@
 
 A row counts in the thesis's tally if a sentence of the thesis makes the claim, and if the sentence is judged as
 strongly, and under the conditions, as it is meant. All other rows count in a tally of this book's own.
+
+    python -m inbounds.study.ledger.quotes thesis.txt     are the words in the thesis's text? whoever has it can ask
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 from inbounds.study.ledger.verdicts import Claim, Finding
@@ -156,3 +161,29 @@ def thesis_and_book(found: Sequence[Finding]) -> tuple[list[Finding], list[Findi
     """
     thesis = [each for each in found if quote(each.claim) is not None]
     return thesis, [each for each in found if each not in thesis]
+
+
+def not_in(text: str) -> list[str]:
+    """Return the names of the quotes whose words a text does not have, spaces, line ends and hyphens apart.
+
+    Args:
+        text: of the thesis.
+
+    Example:
+        >>> not_in("") == list(QUOTES)
+        True
+    """
+
+    def bare(words: str) -> str:
+        return re.sub(r"[\s-]+", "", words)
+
+    return [name for name, quoted in QUOTES.items() if bare(quoted.words) not in bare(text)]
+
+
+if __name__ == "__main__":
+    lacking = not_in(Path(sys.argv[1]).read_text(encoding="utf8"))
+    print(
+        "\n".join(f"not in the text: {name}" for name in lacking)
+        or f"all {len(QUOTES)} quotes are in the text"
+    )
+    sys.exit(bool(lacking))

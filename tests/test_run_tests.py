@@ -1,0 +1,17 @@
+"""`make test` takes a skipped test for one that did not pass, but for the live robot's where npm cannot be reached."""
+
+from pathlib import Path
+
+import pytest
+
+from tools import run_tests
+
+
+@pytest.mark.parametrize(
+    ("reason", "bad"), [(f"{run_tests.MAY_SKIP}: npm cannot be reached", 0), ("tired", 1)]
+)
+def test_what_may_be_skipped(reason: str, bad: int, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    path = tmp_path / "test_two.py"
+    path.write_text(f"import pytest\n\ndef test_a(): pass\n\ndef test_b(): pytest.skip({reason!r})\n")
+    assert run_tests.run(["-p", "no:cacheprovider", str(path)], {"package and book"}) == bad
+    assert ("1 tests of the live robot were left out" in capfd.readouterr().out) == (not bad)
