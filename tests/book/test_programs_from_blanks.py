@@ -86,7 +86,7 @@ def test_signatures_are_the_program_s(name: str) -> None:
 def test_ninety_minutes_and_a_fold_for_five_errors(name: str) -> None:
     text = prose_of(name)
     assert 70 <= sum(map(int, re.findall(r"^## .*\((\d+) minutes\)$", text, re.M))) <= 90
-    assert len(re.findall(r"<summary>Help: ", text)) == text.count("</details>") == 5
+    assert len(re.findall(r"<summary>Help: ", text)) == text.count("</details>") >= 5
     stored = nbformat.read(BUILDS[f"build_{name}.ipynb"], as_version=4).cells
     blanks = [cell for cell in stored if "blank" in cell.metadata.get("tags", [])]
     nodes = [node for cell in blanks for node in ast.walk(ast.parse(cell.source))]
@@ -123,6 +123,10 @@ def changed(name: str, block: str, old: str, new: str) -> dict[str, Any]:
         ("ppo", "update", ".detach()", "", "Trying to backward through the graph a second time"),
         ("ppo", "surrogate", ".mean()", "", "grad can be implicitly created only for scalar outputs"),
         ("ppo", "normalized", "x.std()", "...", "unsupported operand type(s)"),
+        ("ppo", "update", "advantage[index]", "advantage", "The size of tensor a (16) must match"),
+        ("ppo", "update", "advantages(batch, critic)", "...", "cannot unpack non-iterable ellipsis object"),
+        ("trpo", "update", "batch.latent).detach()", "batch.latent)", "Expected parameter loc"),
+        ("trpo", "update", "batch.obs).mean()", "batch.obs)", "grad can be implicitly created only for scalar outputs"),
         ("trpo", "natural_step", ", create_graph=True", "", "element 0 of tensors does not require grad"),
         ("trpo", "natural_step", ", retain_graph=True", "", "Trying to backward through the graph a second time"),
     ],
@@ -130,11 +134,22 @@ def changed(name: str, block: str, old: str, new: str) -> dict[str, Any]:
 def test_the_folds_quote_what_python_says(name: str, block: str, old: str, new: str, message: str) -> None:
     """Each slip raises the error of its fold, and the fold is in the notebook."""
     program, small = changed(name, block, old, new), Small()
-    with pytest.raises((RuntimeError, TypeError)) as raised:
+    with pytest.raises((RuntimeError, TypeError, ValueError)) as raised:
         program["update"](small.policy, small.critic, small.adam(PPO), small.batch, passes=2, size=16)
     assert message in str(raised.value)
     summaries = re.sub(r"</?code>", "", prose_of(name))
-    assert f"Help: I get {message}" in summaries or f"Help: later I get {message}" in summaries
+    assert re.search(rf"Help: (later )?I get ([^<]* or )?{re.escape(message)}", summaries)
+    assert ". " in {"ppo": ppo, "trpo": trpo}[name].update(program["update"]).message  # with its meaning
+
+
+@pytest.mark.parametrize(("name", "blank"), [("ppo", "advantages"), ("trpo", "conjugate_gradient")])
+def test_one_blank_can_be_left_out(name: str, blank: str) -> None:
+    """The fold's lines stand in for the cell, and everything after it passes."""
+    lines = f'whole = {{}}\nprograms.start(whole, "{name}")\n{blank} = whole["{blank}"]'
+    assert f"```python\n{lines}\n```" in prose_of(name)
+    sources = [lines if f"def {blank}(" in each else each for each in cells(name, filled=True)]
+    assert lines in sources
+    assert [verdict.passed for verdict in run(sources)[1]] == [True] * 5
 
 
 def test_a_step_with_a_number_for_each_motor_meets_the_advantages_badly() -> None:

@@ -53,7 +53,7 @@ class Scene:
     critic: nn.Sequential
     """Observations `[B, O]` to values `[B]`."""
     batch: Batch
-    """`obs` `[B, O]` and `latent` `[B, A]`; no loss looks at the other columns."""
+    """`obs`, `next_obs` `[B, O]` and `latent` `[B, A]`; no loss looks at the other columns."""
     advantage: Tensor
     to_go: Tensor
     old_log_prob: Tensor
@@ -77,8 +77,10 @@ class Scene:
             loc, log_scale = actor(obs).chunk(2, -1)
             latent = loc + log_scale.exp() * randn(STEPS, ACT)
             old = policy.log_prob(obs, latent)
-        batch, critic = Batch(obs, latent, None, None, None, None), nn.Sequential(*critic, nn.Flatten(0))
-        return cls(policy, critic, batch, randn(STEPS) + 0.2, 3 * randn(STEPS), old)
+        critic = nn.Sequential(*critic, nn.Flatten(0))
+        steps = randn(STEPS) + 0.2, 3 * randn(STEPS), old
+        batch = Batch(obs, latent, None, None, None, randn(STEPS, OBS))
+        return cls(policy, critic, batch, *steps)
 
     def with_ratios(self, ratio: Tensor) -> Scene:
         """Change the stored log-probabilities so that the present policy has these ratios."""
@@ -88,10 +90,12 @@ class Scene:
         """Change the advantages."""
         return dataclasses.replace(self, advantage=advantage)
 
-    def loss(self, function: Loss, entropy_coef: float = 0.0, value_coef: float = 0.0) -> Tensor:
+    def loss(
+        self, function: Loss, entropy_coef: float = 0.0, value_coef: float = 0.0, clip_range: float = EPSILON
+    ) -> Tensor:
         """Return a loss's value for this minibatch."""
         steps = self.advantage, self.to_go, self.old_log_prob
-        return function(self.policy, self.critic, self.batch, *steps, EPSILON, entropy_coef, value_coef)
+        return function(self.policy, self.critic, self.batch, *steps, clip_range, entropy_coef, value_coef)
 
     def gradients(self, loss: Tensor) -> tuple[Tensor, Tensor]:
         """Return the gradients for policy and critic, a vector each; zero where the loss does not depend on it."""
@@ -198,7 +202,9 @@ def _stops_paying(function: Loss) -> str | None:
     gradient = moved.gradients(policy_loss(function, moved))[0]
     if gradient.any():
         return "for Â > 0 and r > 1 + ε the surrogate is flat: nothing may push these ratios further up"
-    return None
+    if moved.gradients(moved.loss(function, clip_range=1.0))[0].any():
+        return None
+    return "clip_range does not reach the surrogate: 1 + clip_range was 2, and ratios below 2 were clipped; pass it on"
 
 
 def _teaches_the_critic(function: Loss) -> str | None:
@@ -214,8 +220,13 @@ def _teaches_the_critic(function: Loss) -> str | None:
             "[B, 1] minus [B] is [B, B]: every value is compared with every return, and the critic learns their mean. "
             "Both must have the shape [B]"
         )
+    after = scene.critic(scene.batch.next_obs)
+    if _close(gradient[1], scene.gradients(0.5 * (after - scene.to_go).square().mean())[1]):
+        return "to_go is what batch.obs are worth: ask the critic about batch.obs, not about next_obs"
     if not _close(gradient[1], right):
-        return "the critic's gradient must be that of value_coef times the mean of (V − Ĝ)²"
+        return (
+            "the critic's gradient must be that of value_coef times the mean of (critic(batch.obs) − to_go)²"
+        )
     if not _close(gradient[0], scene.gradients(policy_loss(function, scene))[0]):
         return "the value loss moves the policy"
     return None

@@ -26,7 +26,7 @@ from inbounds.learning import (
     trpo,
 )
 
-__all__ = ["PPO", "SEED", "TRPO", "Batch", "Small", "SmallPolicy"]
+__all__ = ["PPO", "SEED", "TRPO", "Batch", "Small", "SmallPolicy", "explained"]
 
 Batch = namedtuple("Batch", "obs latent reward terminated truncated next_obs")
 """The steps of a rollout, a column each, as the growing program keeps them."""
@@ -37,6 +37,34 @@ PPO = PPOConfig(
     horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.05, clip_range=0.1
 )
 TRPO = TRPOConfig(horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.0)
+
+
+ERRORS = {
+    "must match the size of tensor": "a piece meets a whole batch, or a number for each motor a number a step: take "
+    "[index] of advantages, targets and old log-probabilities, and .sum(-1) in the policy's methods",
+    "through the graph a second time": "what is computed once, before the first step, is a constant: .detach() the old "
+    "log-probabilities, and the values in `advantages`",
+    "only for scalar outputs": "one number is wanted: a .mean() is missing",
+    "element 0 of tensors": "a gradient is asked of mere numbers: create_graph=True where a gradient is differentiated "
+    "again, and no .detach() of anything new",
+    "invalid values": "the policy's weights have become nan. A gain() of gradient 0 does that: is the old "
+    "log-probability a constant, .detach()?",
+    "ellipsis": "a blank further up still returns ...: write it, run its cell, and this one again",
+}
+"""Words of an error of Python's → what it means in an update."""
+
+
+def explained(error: Exception) -> str:
+    """An error that a reader's update raised, with its meaning where it is a known one.
+
+    Example:
+        >>> explained(TypeError("cannot unpack non-iterable ellipsis object")).partition(". ")[2][:38]
+        'A blank further up still returns ...: '
+    """
+    first = str(error).partition("\n")[0][:160].rstrip(".")
+    raised = f"it raised {type(error).__name__}: {first}"
+    meaning = next((told for words, told in ERRORS.items() if words in str(error)), "")
+    return f"{raised}. {meaning[0].upper()}{meaning[1:]}" if meaning else raised
 
 
 class SmallPolicy:
@@ -150,7 +178,7 @@ class Small:
         Args:
             flaw: a key of `inbounds.book.exercises.ppo.MISTAKES`' values; "" is none.
         """
-        advantage, to_go = (each[0] for each in self.rollout().advantages(PPO.gamma, PPO.gae_lambda))
+        advantage, to_go = self._advantages()
         clip_range = 0.2 if flaw in ("clip range", "no coefficients") else PPO.clip_range
         bonus = {"no bonus": 0.0, "no coefficients": 1e-4}.get(flaw, PPO.entropy_coef)
         old, adam = self.policy.log_prob(self.batch.obs, self.batch.latent).detach(), self.adam(PPO)
@@ -158,19 +186,25 @@ class Small:
             advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         torch.manual_seed(SEED)
         order = torch.randperm(STEPS)
+        if flaw == "swapped":
+            advantage, to_go = to_go, advantage
         for number in range(1 if flaw == "one pass" else 3):
+            if flaw == "each pass":
+                advantage, to_go = self._advantages()
             if number and flaw != "one order":
                 order = torch.randperm(STEPS)
-            for index in order.split(16):
+            for piece in order.split(16):
+                if flaw == "each step":
+                    advantage, to_go = self._advantages()
+                index = slice(None) if flaw == "no pieces" else piece
+                target = _normalized(to_go[index]) if flaw == "targets" else to_go[index]
                 obs, latent, a = self.batch.obs[index], self.batch.latent[index], advantage[index]
                 if flaw not in ("raw", "whole"):
-                    a = (a - a.mean()) / (a.std() + 1e-8)
+                    a = _normalized(a, flaw)
                 log_prob = self.policy.log_prob(obs, latent)
                 ratio = (log_prob - (log_prob.detach() if flaw == "own density" else old[index])).exp()
                 gain = torch.minimum(ratio * a, a + clip_range * a.abs()).mean()
-                error = (1.0 if flaw == "value coef" else 0.5) * (
-                    self.critic(obs) - to_go[index]
-                ).square().mean()
+                error = (1.0 if flaw == "value coef" else 0.5) * (self.critic(obs) - target).square().mean()
                 if flaw != "accumulate":
                     adam.zero_grad()
                 (error - gain - bonus * self.policy.entropy(obs).mean()).backward()
@@ -178,10 +212,28 @@ class Small:
                 adam.step()
         return self.weights()
 
+    def _advantages(self) -> tuple[Tensor, Tensor]:
+        """GAE and its targets `[T]`, with the critic as it is."""
+        batch = self.batch
+        with torch.no_grad():
+            value, after = self.critic(batch.obs), self.critic(batch.next_obs)
+        ends = batch.terminated
+        residual = batch.reward + PPO.gamma * torch.where(ends > 0, 0.0, after) - value
+        found, later = torch.zeros_like(value), 0.0
+        for t in range(STEPS - 1, -1, -1):
+            later = 0.0 if ends[t] + batch.truncated[t] > 0 else later
+            found[t] = later = residual[t] + PPO.gamma * PPO.gae_lambda * later
+        return found, found + value
+
     def _clip(self, flaw: str) -> None:
         both = [*self.policy.net.parameters()], [*self.critic.parameters()]
         for weights in both if flaw == "apart" else () if flaw == "free" else ([*both[0], *both[1]],):
             nn.utils.clip_grad_norm_(weights, 0.5)
+
+
+def _normalized(x: Tensor, flaw: str = "") -> Tensor:
+    spread = x.std(correction=0 if flaw == "population" else 1) + 1e-8
+    return x - x.mean() / spread if flaw == "bracket" else (x - x.mean()) / spread
 
 
 def _plain(net: Any) -> nn.Sequential:

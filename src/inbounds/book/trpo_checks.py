@@ -15,6 +15,7 @@ that one broken line fails one of them:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -35,7 +36,7 @@ SIZE = 4
 class Problem:
     """A surrogate and a divergence of Δ = θ − θ_old in closed form.
 
-    The surrogate is gᵀΔ − bend·|Δ|²; the divergence is q + steep·q² with q = ½ΔᵀFΔ: the Hessian at Δ = 0 is F.
+    The surrogate is level + gᵀΔ − bend·|Δ|²; the divergence is q + steep·q² with q = ½ΔᵀFΔ: the Hessian at Δ = 0 is F.
     """
 
     fisher: Tensor
@@ -44,6 +45,10 @@ class Problem:
     """`[P]`."""
     bend: float = 0.0
     steep: float = 0.0
+    level: float = 0.0
+    """The surrogate at the start."""
+    edge: float = math.inf
+    """From this |Δ|² on, the surrogate is as it was at the start."""
 
     @property
     def start(self) -> Tensor:
@@ -56,9 +61,10 @@ class Problem:
         return self.fisher + DAMPING * torch.eye(SIZE, dtype=torch.float64)
 
     def surrogate(self, theta: Tensor) -> Tensor:
-        """Return the surrogate, 0 at the start."""
+        """Return the surrogate."""
         step = theta - self.start
-        return step @ self.gradient - self.bend * (step @ step)
+        square = step @ step
+        return self.level + (square < self.edge) * (step @ self.gradient - self.bend * square)
 
     def mean_kl(self, theta: Tensor) -> Tensor:
         """Return the divergence, 0 at the start."""
@@ -175,13 +181,25 @@ def _improvement(function: Step) -> str:
     gain = posed.surrogate(posed.start + step).item()
     if gain <= 0:
         return f"the surrogate changed by {gain:.2g}: accept a length only if the surrogate goes up"
+    raised = round_problem(bend=8.0, level=5.0)
+    if raised.surrogate(raised.start + raised.moved(function)) < raised.level:
+        return "a surrogate of 5 fell, and stayed above 0: compare with its value before the step, not with 0"
+    square = (posed.full() @ posed.full()).item()
+    flat = round_problem(edge=0.5 * square)
+    if flat.moved(function) @ flat.moved(function) > flat.edge:
+        return (
+            "the surrogate was as large as before, and the step was taken: it must be *larger*, > and not >="
+        )
     return ""
 
 
 def _refusal(function: Step) -> str:
     step = round_problem(bend=1e9, steep=1e30).moved(function)
     if step.any():
-        return "no length was acceptable, yet the weights moved: put the old ones back"
+        return (
+            "no length was acceptable, yet the weights moved: put the old ones back (a copy of them; list(weights) is "
+            "none)"
+        )
     return ""
 
 

@@ -79,13 +79,16 @@ def test_lambda_return_mistakes(wrong: Callable, words: str) -> None:
     assert words in verdict.message
 
 
-def growing(batch, critic, gamma=0.99, lam=0.95, *, ends=1.0, cuts=0.0, stop=(1, 1), weight=None, plus=1.0):
+def growing(batch, critic, gamma=0.99, lam=0.95, *, ends=1.0, cuts=0.0, stop=(1, 1), weight=None, plus=1.0,
+            added=False, graph=()):  # fmt: skip
     """The growing program's, with its mistakes on demand."""
-    value, after = critic(batch.obs).detach(), critic(batch.next_obs).detach()
+    value, after = critic(batch.obs), critic(batch.next_obs)
+    value, after = value if "now" in graph else value.detach(), after if "next" in graph else after.detach()
     alive = 1 - ends * batch.terminated - cuts * batch.truncated
     residual = batch.reward + gamma * alive * after - value
     keep = (gamma * lam if weight is None else weight(gamma, lam)) * (1 - stop[0] * batch.terminated)
     keep = keep * (1 - stop[1] * batch.truncated)
+    keep = gamma * lam * (1 - (batch.terminated + batch.truncated)) if added else keep
     advantage, later = torch.zeros_like(value), 0
     for t in reversed(range(len(value))):
         advantage[t] = later = residual[t] + keep[t] * later
@@ -118,6 +121,19 @@ RIGHT = {
             ),
             "wrong way round",
         ),
+        (lambda *a: growing(*a)[::-1], "the other way round"),
+        (
+            lambda batch, critic, *a: (
+                found := growing(batch, critic, *a)[0],
+                found + critic(batch.next_obs),
+            ),
+            "not of next_obs",
+        ),
+        (lambda *a: growing(*a, weight=lambda gamma, lam: gamma), "λ is missing"),
+        (lambda *a: growing(*a, added=True), "a step can have both flags"),
+        (lambda *a: growing(*a, graph=("now", "next")), ".detach() both values"),
+        (lambda *a: growing(*a, graph=("now",)), ".detach() both values"),
+        (lambda *a: growing(*a, graph=("next",)), ".detach() both values"),
         (lambda *a: tuple(1 + x for x in growing(*a)), "the value is wrong"),
         (lambda batch, critic, gamma, lam: batch.rewards, "AttributeError"),
     ],

@@ -122,6 +122,7 @@ RIGHT = {"effective_sample_size": stable, "surrogate_of": right}
         (lambda p, b, a, old: (log_prob_of(p, b) * a).mean(), "without a ratio"),
         (lambda *x: growing(*x) + 1, "the value is wrong"),
         (lambda p, b, a, old: p.log_probs, "AttributeError"),
+        (lambda p, b, a, old: ((p.log_prob(b.latent, b.obs) - old).exp() * a).mean(), "batch.obs first"),
     ],
 )
 def test_mistakes_of_the_growing_program(wrong: Callable, words: str) -> None:

@@ -143,6 +143,17 @@ def walk(beta: Callable = lambda new, old: new / old, stop: float = 1e-20, slip:
     return conjugate_gradient
 
 
+def in_place(product, b, iterations):
+    x, residual, direction = torch.zeros_like(b), b, b
+    for _ in range(iterations):
+        image, square = product(direction), residual @ residual
+        length = square / (direction @ image)
+        x += length * direction
+        residual -= length * image
+        direction = residual + (residual @ residual / square) * direction
+    return x
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -157,6 +168,7 @@ def walk(beta: Callable = lambda new, old: new / old, stop: float = 1e-20, slip:
         (lambda product, b, iterations: b - product(walk()(product, b, iterations)), "the residual"),
         (walk(stop=-1.0), "divides 0 by 0"),
         (lambda product, b, iterations: 2 * b, "nearest to the solution"),
+        (in_place, "b itself was changed"),
     ],
 )
 def test_known_mistakes_of_the_solver_are_named(wrong: Callable, words: str) -> None:
@@ -219,6 +231,35 @@ def test_known_mistakes_of_the_line_search_are_named(flaws: dict[str, Any], chec
     assert f'check "{check}"' in verdict.message
 
 
+@pytest.mark.parametrize(
+    ("improved", "words"),
+    [
+        (lambda after, before: after >= before, "> and not >="),
+        (lambda after, before: after > 0, "not with 0"),
+    ],
+)
+def test_a_line_search_must_see_a_larger_surrogate(improved: Callable, words: str) -> None:
+    verdict = graders.line_search(partial(right_line_search, improved=improved))
+    assert verdict.passed is False
+    assert verdict.message.startswith('check "improvement"')
+    assert words in verdict.message
+    assert words in graders.trpo_step(partial(step, improved=improved)).message
+
+
+def test_halves_added_to_moved_weights_are_named() -> None:
+    @torch.no_grad()
+    def an_alias(gain, mean_kl, weights, full, max_kl):
+        old, before = list(weights), gain()
+        for k in range(10):
+            vector_to_parameters(parameters_to_vector(old) + 0.5**k * full, weights)
+            if mean_kl() <= max_kl and gain() > before:
+                return
+
+    verdict = graders.line_search(an_alias)
+    assert verdict.passed is False
+    assert "list(weights) is none" in verdict.message
+
+
 def right_surrogate(policy, batch, advantage, old_log_prob):
     log_ratio = policy.log_prob(batch.obs, batch.latent) - old_log_prob
     return (torch.exp(log_ratio) * advantage).mean()
@@ -234,6 +275,10 @@ def update(policy, critic, adam, batch, max_kl, passes, size, *, flaw=""):
     """By dense algebra; its advantages are those of the test beside it."""
     advantage, to_go = right_advantages(batch, critic)
     old, old_outputs = policy.log_prob(batch.obs, batch.latent).detach(), policy.net(batch.obs).detach()
+    if flaw == "own density":
+        old = policy.log_prob(batch.obs, batch.latent)
+    if flaw == "swapped":
+        advantage, to_go = to_go, advantage
     if flaw != "raw":
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
 
@@ -241,7 +286,8 @@ def update(policy, critic, adam, batch, max_kl, passes, size, *, flaw=""):
         return right_surrogate(policy, batch, advantage, old)
 
     def mean_kl():
-        return policy.kl(old_outputs, batch.obs).mean()
+        each = policy.kl(old_outputs, batch.obs)
+        return each if flaw == "no mean" else each.mean()
 
     weights = list(policy.net.parameters())
     if flaw != "lazy":
@@ -269,6 +315,9 @@ def exact_iterate(gain, mean_kl, weights, max_kl):
         ("lazy", "policy has not moved"),
         ("no critic", "critic has not learned"),
         ("wrong target", "the policy is right; the critic"),
+        ("swapped", "*first* of the two that `advantages` returns"),
+        ("own density", ".detach() the old log-probabilities"),
+        ("no mean", "a .mean() is missing"),
     ],
 )
 def test_an_update_is_judged_by_both_networks(flaw: str, words: str) -> None:

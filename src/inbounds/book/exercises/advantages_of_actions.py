@@ -52,6 +52,7 @@ def advantages(function: Callable[..., Any]) -> Judgement:
             return np.stack([found, found + value]) if shown == 2 else found
 
         right = wrong()
+        added = _flags_added(value, after, reward, terminated, truncated, gamma, lam)
         mistakes = {
             "a truncated step counts as an end: its residual needs the value of next_obs": wrong(
                 cut_ends=True
@@ -72,6 +73,15 @@ def advantages(function: Callable[..., Any]) -> Judgement:
             "the second result is what the critic learns: the advantage *plus* the value, not the advantage": np.stack(
                 [right[0], right[0]]
             ),
+            "the order is the other way round: the advantages first, then what the critic learns": right[
+                ::-1
+            ],
+            "what the critic learns is the advantage plus the value of batch.obs, not of next_obs": np.stack(
+                [right[0], right[0] + after]
+            ),
+            "λ is missing: what follows counts γλ, not γ": wrong(no_lam=True),
+            "a step can have both flags, and 1 − (terminated + truncated) is −1 there: multiply by (1 − terminated) "
+            "and by (1 − truncated)": np.stack([added, added + value]),
             "the loop runs backwards, so the list is the wrong way round: turn it": np.stack(
                 [right[0][::-1], right[0][::-1] + value]
             ),
@@ -84,8 +94,39 @@ def advantages(function: Callable[..., Any]) -> Judgement:
         case(6, (), (2,), 0.9, 0.8),
         case(12, (1, 8), (4,), 0.97, 0.95),
         case(5, (4,), (), 0.9, 1.0),
+        case(6, (2,), (2,), 0.9, 0.8),  # the last step of the clock may also be a fall
     ]
-    return judge_cases(function, cases, "right: residuals, summed up to the end of each episode")
+    verdict = judge_cases(function, cases, "right: residuals, summed up to the end of each episode")
+    if verdict.passed and _moves_a_critic(function, cases[0].arguments):
+        constants = (
+            "advantages and targets are constants; yours carry the critic's graph: .detach() both values"
+        )
+        return Judgement(verdict.exercise, False, constants)
+    return verdict
+
+
+def _moves_a_critic(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bool:
+    """Whether a gradient reaches the critic through what `advantages` returns."""
+    batch, critic, *numbers = arguments
+    weight = torch.ones((), dtype=torch.float64, requires_grad=True)
+    try:
+        found = function(batch, lambda obs: weight * critic(obs), *numbers)
+    except RuntimeError:  # NumPy and in-place writes refuse a graph
+        return True
+    with_graph = [each for each in found if isinstance(each, torch.Tensor) and each.requires_grad]
+    slopes = [torch.autograd.grad(x.sum(), weight, allow_unused=True, retain_graph=True) for x in with_graph]
+    return any(slope is not None for (slope,) in slopes)
+
+
+def _flags_added(
+    value: Any, after: Any, reward: Any, terminated: Any, truncated: Any, gamma: float, lam: float
+) -> np.ndarray:
+    """GAE by its recursion, with 1 − (terminated + truncated) as the mask."""
+    residual = reward + gamma * (1 - terminated) * after - value
+    keep, total, later = gamma * lam * (1 - (terminated + truncated)), np.zeros(len(reward)), 0.0
+    for t in reversed(range(len(reward))):
+        total[t] = later = residual[t] + keep[t] * later
+    return total
 
 
 def _estimates(
@@ -102,13 +143,14 @@ def _estimates(
     leaks: bool = False,
     leaks_at_cuts: bool = False,
     no_gamma: bool = False,
+    no_lam: bool = False,
     alone: bool = False,
 ) -> np.ndarray:
     """GAE by its definition, a sum for each step; flaws on demand."""
     blind = (terminated if not end_goes_on else 0 * terminated) + (truncated if cut_ends else 0.0)
     residual = reward + gamma * (1 - blind) * after - value
     stops = (0 if leaks else 1) * (terminated + (0 if leaks_at_cuts else 1) * truncated) > 0
-    weight = (1.0 if no_gamma else gamma) * lam
+    weight = (1.0 if no_gamma else gamma) * (1.0 if no_lam else lam)
     total = np.zeros(len(reward))
     for t in range(len(reward)):
         last = t if alone else next((k for k in range(t, len(reward)) if stops[k]), len(reward) - 1)

@@ -55,15 +55,20 @@ def effective_sample_size(function: Callable[..., Any]) -> Judgement:
 
 def surrogate(function: Callable[..., Any]) -> Judgement:
     """The growing program's `surrogate`: its value, and the gradient that reaches the policy."""
-    rng = np.random.default_rng(0)
+    rng, swapped = np.random.default_rng(0), []
 
     @functools.wraps(function)
     def value_and_slope(
         shift: float, log_prob: torch.Tensor, old: torch.Tensor, advantage: torch.Tensor
     ) -> Any:
         at = torch.tensor(shift, dtype=torch.float64, requires_grad=True)
-        policy = SimpleNamespace(log_prob=lambda obs, latent: log_prob + at * torch.arange(len(log_prob)))
-        batch = SimpleNamespace(obs=None, latent=None)
+        batch = SimpleNamespace(obs=torch.zeros(len(log_prob), 3), latent=torch.zeros(len(log_prob), 2))
+
+        def present(obs: Any, latent: Any) -> torch.Tensor:
+            swapped.extend([1] if obs is batch.latent or latent is batch.obs else [])
+            return log_prob + at * torch.arange(len(log_prob))
+
+        policy = SimpleNamespace(log_prob=present)
         found = function(policy, batch, advantage, old)
         if not isinstance(found, torch.Tensor) or found.ndim:
             return found
@@ -99,7 +104,10 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
         arguments = (shift, *map(torch.from_numpy, (log_prob, old, advantage)))
         return Case(arguments, right, mistakes)
 
-    return judge_cases(value_and_slope, [case(5), case(40)], "right: ratio times advantage, averaged")
+    verdict = judge_cases(value_and_slope, [case(5), case(40)], "right: ratio times advantage, averaged")
+    if swapped:
+        return Judgement(verdict.exercise, False, "log_prob takes batch.obs first, then batch.latent")
+    return verdict
 
 
 def surrogate_of(function: Callable[..., Any]) -> Judgement:

@@ -23,7 +23,7 @@ from inbounds.book.exercises.judging import (
     judge_diagnosis,
 )
 from inbounds.book.ppo_checks import CHECKS, Loss, Scene, policy_loss
-from inbounds.book.small_updates import PPO, SEED, Small
+from inbounds.book.small_updates import PPO, SEED, Small, explained
 
 __all__ = ["diagnosis", "loss", "policy", "surrogate", "update"]
 
@@ -104,6 +104,7 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
         >>> surrogate(lambda policy, batch, advantage, old_log_prob, clip_range: advantage.mean())
         ✗ not yet: <lambda>: there is no ratio in it: exp(new log-probability − old)
     """
+    swapped: list[int] = []
 
     def case(ratio: list[float], advantage: list[float], clip_range: float) -> Case:
         w, a = np.array(ratio), np.array(advantage)
@@ -131,15 +132,37 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
         values = {words: wrong.mean() for words, wrong in mistakes.items()}
         if len(w) > 1:
             values |= {"that is a sum over the batch: take the mean": expected.sum()}
-            values |= {"one number is wanted, the mean over the batch": expected}
-        new, before = torch.tensor(old + np.log(w)), torch.tensor(old)
-        policy = SimpleNamespace(log_prob=lambda obs, latent: new)
-        batch = SimpleNamespace(obs=torch.zeros(len(w), 1), latent=torch.zeros(len(w), 1))
+        values |= {"one number is wanted, the mean over the batch": expected}
+        new, before = torch.tensor(old + np.log(w), requires_grad=True), torch.tensor(old)
+        batch = SimpleNamespace(obs=torch.zeros(len(w), 3), latent=torch.zeros(len(w), 2))
+
+        def log_prob(obs: Any, latent: Any) -> Tensor:
+            swapped.extend([1] if obs is batch.latent or latent is batch.obs else [])
+            return 1.0 * new
+
+        policy = SimpleNamespace(log_prob=log_prob, new=new, slope=w * a * (first <= right) / len(w))
         return Case((policy, batch, torch.tensor(a), before, clip_range), expected.mean(), values)
 
     six = [0.5, 1.05, 1.7, 0.5, 1.05, 1.7], [2.0, 2.0, 2.0, -1.0, -1.0, -1.0]
     cases = [case([1.05], [2.0], 0.2), case(*six, 0.2), case(*six, 0.02)]
-    return judge_cases(function, cases, "right, in all six cases")
+    verdict = judge_cases(function, cases, "right, in all six cases")
+    complaint = "log_prob takes batch.obs first, then batch.latent" if swapped else ""
+    if verdict.passed and not complaint:
+        complaint = _of_a_slope(function, cases[1].arguments)
+    return Judgement(verdict.exercise, False, complaint) if complaint else verdict
+
+
+def _of_a_slope(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+    """What is wrong with the gradient that a surrogate of the right value sends to the policy."""
+    found, new = function(*arguments), arguments[0].new
+    slope = None
+    if isinstance(found, Tensor) and found.requires_grad:
+        (slope,) = torch.autograd.grad(found, new, allow_unused=True)
+    if slope is None or not slope.any():
+        return "no gradient reaches the policy: nothing of the new log-probability may be detached"
+    if not torch.allclose(slope, torch.from_numpy(arguments[0].slope)):
+        return "its value is right, its gradient is not: nothing of the new log-probability may be detached"
+    return ""
 
 
 def loss(function: Loss) -> Judgement:
@@ -187,14 +210,18 @@ def update(function: Callable[..., Any]) -> Judgement:
         … not answered: <lambda>: the weights have not moved: write it, and run this cell again
     """
     name, small = getattr(function, "__name__", "your function"), Small()
-    before = small.weights()
+    before, adam, taken = small.weights(), small.adam(PPO), []
+    adam.register_step_post_hook(lambda *_: taken.append(1))
     torch.manual_seed(SEED)
     coefficients = {key: getattr(PPO, key) for key in ("clip_range", "entropy_coef", "value_coef")}
     try:
-        function(small.policy, small.critic, small.adam(PPO), small.batch, passes=3, size=16, **coefficients)
+        function(small.policy, small.critic, adam, small.batch, passes=3, size=16, **coefficients)
     except Exception as error:
-        return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
+        return Judgement(name, False, explained(error))
     after = small.weights()
+    if torch.equal(before, after) and taken:
+        order = "zero_grad, backward, clip_grad_norm_, adam.step(), in this order"
+        return Judgement(name, False, f"Adam took steps without a gradient, and nothing moved: {order}")
     if torch.equal(before, after):
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
     if _same(after, small.after_the_packages(PPO)):
@@ -217,6 +244,13 @@ def _same(a: Tensor, b: Tensor) -> bool:
 
 MISTAKES: Mapping[str, str] = {
     "the advantages are not normalised": "raw",
+    "the standard deviation is x.std(), torch's own, which divides by n − 1": "population",
+    "a bracket is missing in normalized: (x − mean) is divided, not the mean alone": "bracket",
+    "the critic's targets are normalised too: only the advantages are": "targets",
+    "every step sees the whole batch: give loss the piece, Batch(*(column[index] for column in batch))": "no pieces",
+    "the advantages are computed anew in each pass: once, before the first step": "each pass",
+    "the advantages are computed anew in each step: once, before the first step": "each step",
+    "advantages(batch, critic) returns the advantages first, then the critic's targets": "swapped",
     "advantages are normalised over the whole batch; do it in each minibatch": "whole",
     "the steps are shuffled once; shuffle anew in each pass": "one order",
     "only one pass is made over the data": "one pass",

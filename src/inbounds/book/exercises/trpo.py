@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn.utils import parameters_to_vector
 
 from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
-from inbounds.book.small_updates import SEED, TRPO, Small
+from inbounds.book.small_updates import SEED, TRPO, Small, explained
 from inbounds.book.trpo_checks import CHECKS, DAMPING, MAX_KL, Step, parallel, problem, round_problem
 
 __all__ = [
@@ -81,6 +81,7 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
     """
     posed = problem()
     matrix, b = posed.damped, posed.gradient
+    given: list[Tensor] = []
 
     def best(k: int) -> Tensor:  # by the theorem: nearest to the solution in the matrix's own norm
         space = torch.stack([torch.linalg.matrix_power(matrix, i) @ b for i in range(k)], 1)
@@ -120,17 +121,22 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
             "the sign is wrong: it solves for −b": -best(k),
             "that is the residual: return x": b - matrix @ best(k),
         }
+        given.append(b.clone())
         return Case(
-            (lambda v: matrix @ v, b, k),
+            (lambda v: matrix @ v, given[-1], k),
             best(k),
             mistakes,
-            hint="it is not the point of the Krylov space nearest to the solution",
+            hint=f"it is not the point nearest to the solution that {k} products of b can reach",
         )
 
     easy = torch.ones(3, dtype=torch.float64)
     done = {"when the residual has vanished, the next step divides 0 by 0: stop before": easy * torch.nan}
     cases = [case(1), case(2), case(4), Case((lambda v: 2 * v, easy, 5), easy / 2, done)]
-    return judge_cases(function, cases, "right: nearest in the Krylov space, and it stops when it is done")
+    verdict = judge_cases(function, cases, "right: nearest in the Krylov space, and it stops when it is done")
+    if any(not torch.equal(each, b) for each in given):
+        alias = "residual and direction are other names of it, and += or -= writes into it: residual = residual − …"
+        return Judgement(verdict.exercise, False, f"b itself was changed: {alias}")
+    return verdict
 
 
 def natural_step(function: Callable[..., Any]) -> Judgement:
@@ -205,13 +211,31 @@ def line_search(function: Callable[..., Any]) -> Judgement:
             return ""
         return "the full step keeps both promises, and is to be taken"
 
+    def trust(function: Step) -> str:
+        posed, tried = round_problem(steep=950.0), []
+        weights = posed.weights()
+        gain, mean_kl = posed.of(weights)
+
+        def watched() -> Tensor:
+            tried.append((parameters_to_vector(weights).detach() - posed.start).norm())
+            return mean_kl()
+
+        function(gain, watched, weights, MAX_KL, DAMPING)
+        if max(tried, default=0.0) > 1.01 * posed.full().norm():
+            return (
+                "a shorter step is added to weights that have moved already: every length starts at the *old* weights. "
+                "Keep a copy of them; list(weights) is none, parameters_to_vector(weights) is one"
+            )
+        return CHECKS["trust"](function)
+
     def answered() -> bool:
         posed = round_problem()
         weights = posed.weights()
         return step(*posed.of(weights), weights, MAX_KL, DAMPING) is not ...
 
     step.__name__ = getattr(function, "__name__", "line_search")
-    checks = {"length": whole} | {name: CHECKS[name] for name in ("trust", "improvement", "refusal")}
+    own: dict[str, Step] = {"length": whole, "trust": trust}
+    checks = own | {name: CHECKS[name] for name in ("improvement", "refusal")}
     return judge_by_checks(step, checks, answered)
 
 
@@ -232,7 +256,7 @@ def update(function: Callable[..., Any]) -> Judgement:
     try:
         function(small.policy, small.critic, small.adam(TRPO), small.batch, max_kl=0.01, passes=3, size=16)
     except Exception as error:
-        return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
+        return Judgement(name, False, explained(error))
     after, right = small.weights(), small.after_the_packages(TRPO)
     if torch.equal(before, after):
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
@@ -252,13 +276,13 @@ def update(function: Callable[..., Any]) -> Judgement:
         )
     if not same[0]:
         hints = (
-            "are the advantages normalised over the whole batch? is the old policy detached? does the value regression "
-            "leave it alone?"
+            "are the advantages the *first* of the two that `advantages` returns, and normalised over the whole batch? "
+            "is the old policy detached? does the value regression leave it alone?"
         )
         return Judgement(name, False, f"the policy ends elsewhere than the package's: {hints}")
     hints = (
-        "is torch.randperm called once a pass, and for nothing else? is the target the reward to go, the loss its mean "
-        "squared error?"
+        "does torch.randperm shuffle, once a pass, and nothing else? is the target the second of the two that "
+        "`advantages` returns, the loss its mean squared error?"
     )
     return Judgement(
         name, False, f"the policy is right; the critic ends elsewhere than the package's: {hints}"
