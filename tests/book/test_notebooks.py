@@ -276,3 +276,12 @@ def test_a_broken_notebook_fails_the_build(tmp_path: Path) -> None:
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         assert done.returncode != 0
         assert "planted" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_books_own_solutions_pass(path: Path) -> None:
+    """A solution that its grader refuses, or a stub that was left without one, would be printed like any output."""
+    for cell in nbformat.read(path, as_version=4).cells:
+        for output in cell.get("outputs", []):
+            said = str(output.get("data", {}).get("text/plain", ""))
+            assert not said.startswith(("✗ not yet", "… not answered")), said
