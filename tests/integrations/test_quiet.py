@@ -60,7 +60,7 @@ def test_models_of_the_peer_start_so_in_a_lopsided_box(algorithm, policy) -> Non
 
 def test_what_has_no_such_start_is_refused() -> None:
     with pytest.raises(ValueError, match="this policy has SACPolicy"):
-        quiet_start(SAC("MlpPolicy", Tank(), device="cpu"))  # type: ignore[type-var]
+        quiet_start(SAC("MlpPolicy", Tank(), device="cpu"))
     with pytest.raises(ValueError, match="StateDependentNoiseDistribution"):
         quiet_start(PPO("MlpPolicy", Tank(), use_sde=True, device="cpu"))
     with pytest.raises(ValueError, match="CategoricalDistribution"):

@@ -26,7 +26,7 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
         std: of the executed action, in units of half the action range.
 
     Returns:
-        σ of the latent: of the logit-normal's z, or of the Gaussian in units of half the action range.
+        The latent's σ; a Gaussian's in units of half the action range.
 
     Raises:
         ValueError: another law, or a std that no σ of it gives.

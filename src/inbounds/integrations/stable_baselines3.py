@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -27,7 +27,6 @@ from inbounds.integrations.quiet import quiet_scale
 
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
-    from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
     from stable_baselines3.common.policies import ActorCriticPolicy
 except ImportError as error:
     raise ImportError(
@@ -35,8 +34,6 @@ except ImportError as error:
     ) from error
 
 __all__ = ["LogitNormalDistribution", "LogitNormalPolicy", "quiet_start"]
-
-Model = TypeVar("Model", bound=OnPolicyAlgorithm)
 
 
 class LogitNormalDistribution(DiagGaussianDistribution):
@@ -146,7 +143,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
         return box.low, box.high
 
 
-def quiet_start(model: Model, std: float = 0.4) -> Model:
+def quiet_start(model: Any, std: float = 0.4) -> Any:
     """Centre an untrained policy in its box and give its actions the standard deviation std; call it before `learn`.
 
     The peer starts with log σ = 0, in the box's units for its own Gaussian, whatever the box. What is set here is the

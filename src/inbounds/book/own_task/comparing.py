@@ -132,7 +132,7 @@ def compare(
         seed: of the bootstrap.
 
     Returns:
-        By name: mean and lead. Policies are resampled by seed: another training run, the same days. One actor is
+        Mean and lead of each name. Policies are resampled by seed (another training run, the same days). One actor is
         resampled by day, and its lead is paired day by day. The rival's own lead is None.
 
     Raises:
