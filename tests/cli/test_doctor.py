@@ -46,6 +46,17 @@ def test_a_missing_package_and_an_old_one_are_named(monkeypatch: pytest.MonkeyPa
     assert "one thing is missing" in out.lower()
 
 
+def test_packages_that_cannot_be_looked_at_are_called_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def requires(name: str) -> list[str]:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "requires", requires)
+    looks = [look for look in doctor.LOOKS if getattr(look, "func", look) is doctor.look_at_packages]
+    code, out = only(monkeypatch, *looks)
+    assert code == 1
+    assert out.count("✗ packages: PackageNotFoundError") == len(looks) == 4
+
+
 def test_what_only_some_need_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     def version(name: str) -> str:
         raise metadata.PackageNotFoundError(name)

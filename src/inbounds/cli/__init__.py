@@ -75,7 +75,6 @@ def _run(args: list[str]) -> int:
         return 0
     # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
     from inbounds.cli import benchmark, options, training, watching
-    from inbounds.cli.classroom import doctor, grading
     from inbounds.headless import BackendError
 
     try:
@@ -91,8 +90,12 @@ def _run(args: list[str]) -> int:
         if isinstance(command, options.Watch):
             return watching.run(command)
         if isinstance(command, options.Doctor):
+            from inbounds.cli.classroom import doctor
+
             return doctor.run()
         if isinstance(command, options.Grade):
+            from inbounds.cli.classroom import grading
+
             return grading.run(command.notebooks, command.seconds, command.gigabytes, command.out)
         return benchmark.run([])
     except SystemExit as exit_:  # tyro has written its help, or what is wrong

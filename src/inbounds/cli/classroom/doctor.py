@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Literal
@@ -108,16 +109,17 @@ def look_at_drawing() -> Diagnosis:
             [sys.executable, "-c", _DRAW], capture_output=True, text=True, timeout=DRAW_SECONDS, check=False
         )
     except subprocess.TimeoutExpired:
-        return Diagnosis(
-            "drawing", "missing", f"no frame within {DRAW_SECONDS:.0f} s, by {backend}", "see below"
-        )
-    if done.returncode == 0:
-        return Diagnosis("drawing", "fine", f"off screen, by {backend}")
-    last = (done.stderr.strip().splitlines() or [f"the process ended with code {done.returncode}"])[-1]
+        wrong = f"no frame within {DRAW_SECONDS:.0f} s, by {backend}"
+    else:
+        if done.returncode == 0:
+            return Diagnosis("drawing", "fine", f"off screen, by {backend}")
+        said = done.stderr.strip().splitlines() or [f"the process ended with code {done.returncode}"]
+        wrong = said[-1]
     from inbounds.headless import PACKAGES_HINT
 
-    remedy = f"{PACKAGES_HINT} (on Debian and Ubuntu); films are left out without it"
-    return Diagnosis("drawing", "missing", last, remedy)
+    return Diagnosis(
+        "drawing", "missing", wrong, f"{PACKAGES_HINT} (on Debian and Ubuntu): the book's films need it"
+    )
 
 
 def look_at_films() -> Diagnosis:
@@ -161,7 +163,7 @@ def look_at_training() -> Diagnosis:
 LOOKS: tuple[Callable[[], Diagnosis], ...] = (
     look_at_python,
     look_at_packages,
-    *(lambda extra=extra: look_at_packages(extra) for extra in ("book", "fast", "lab")),
+    *(partial(look_at_packages, extra) for extra in ("book", "fast", "lab")),
     look_at_disk,
     look_at_drawing,
     look_at_films,
