@@ -13,23 +13,10 @@ from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.book.report.html import Shown
+from inbounds.book.report.many_resamples import of as of
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
-
-
-def of(rows: Sequence[Evidence], **which: str) -> list[Evidence]:
-    """Return the rows with certain values.
-
-    Args:
-        rows: of `equal_start.laws` or `quiet_starts`.
-        **which: name of a field and its value, such as `algorithm="ppo"`.
-
-    Example:
-        >>> of([], algorithm="ppo")
-        []
-    """
-    return [row for row in rows if all(getattr(row, name) == value for name, value in which.items())]
 
 
 def sign(row: Evidence) -> int:

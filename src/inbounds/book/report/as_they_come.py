@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from inbounds.book.report import html
 from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.book.report.html import Shown
+from inbounds.book.report.many_resamples import difference_of
+from inbounds.book.report.many_resamples import of as of
 from inbounds.book.report.words import pair_name, title_of
 from inbounds.study import analysis, statistics
-from inbounds.study.analysis import CONTRASTS, Contrast, generator_for, marked, scores
+from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.second import MARGINS
@@ -29,8 +30,6 @@ from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import verdict
-
-RESAMPLES = 100_000
 
 
 @dataclass(frozen=True)
@@ -105,23 +104,8 @@ def compared(outcomes: Outcomes, arm: str, endpoints: Sequence[str] = tuple(ENDP
 
 def _again(outcomes: Outcomes, contrast: Contrast, robot: str, endpoint: str) -> Estimate:
     """Return a difference with many resamples."""
-    pair = [each for column in contrast.columns if (each := outcomes.find(column, robot)) is not None]
-    rng = generator_for("many resamples", *contrast, robot, endpoint)
-    first, second = (scores(each, endpoint) for each in pair)
-    found = statistics.difference(
-        first, second, rng, statistic="mean", resamples=RESAMPLES, missing="exclude"
-    )
-    return marked(found, *pair)
-
-
-def of(rows: Sequence[Compared], **which: Any) -> list[Compared]:
-    """Return the rows with certain values.
-
-    Example:
-        >>> of([], endpoint="final")
-        []
-    """
-    return [row for row in rows if all(getattr(row, name) == value for name, value in which.items())]
+    first, second = (found for c in contrast.columns if (found := outcomes.find(c, robot)) is not None)
+    return difference_of(first, second, endpoint, "many resamples", *contrast, robot, endpoint)
 
 
 def told(rows: Sequence[Compared]) -> str:

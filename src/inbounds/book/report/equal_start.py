@@ -15,13 +15,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from inbounds.book.report.many_resamples import difference_of
 from inbounds.study import statistics
-from inbounds.study.analysis import generator_for, marked, scores
 from inbounds.study.grid import AFTERWARDS, FREE, ROBOTS, second_cells
 from inbounds.study.outcomes import Column, Outcome, Outcomes
 from inbounds.study.second import GAUSSIAN, MARGINS, primary
 from inbounds.study.second.pooled import is_whole
-from inbounds.study.second.primary import BOUNDED, RESAMPLES, finding, gap
+from inbounds.study.second.primary import BOUNDED, finding, gap
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
 from inbounds.study.statistics.settings import SIGNIFICANCE
@@ -232,15 +232,7 @@ def _minus(
     if first is None or second is None:
         return None
     cell = first.cell
-    difference = statistics.difference(
-        scores(first, endpoint),
-        scores(second, endpoint),
-        generator_for("equal start", cell.id, second.cell.id, endpoint),
-        statistic="mean",
-        resamples=RESAMPLES,
-        missing="exclude",
-    )
-    told = marked(difference, first, second)
+    told = difference_of(first, second, endpoint, "equal start", cell.id, second.cell.id, endpoint)
     return Evidence(cell.robot, cell.algorithm, cell.family, endpoint, told, 1, as_it_comes=as_it_comes)
 
 

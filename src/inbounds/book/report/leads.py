@@ -13,13 +13,11 @@ from inbounds.book.report.as_they_come import compared
 from inbounds.book.report.equal_start import laws
 from inbounds.book.report.forests import MARGINS_AS_UNIT, Bar, forest, in_words
 from inbounds.book.report.html import Shown
+from inbounds.book.report.many_resamples import difference_of
 from inbounds.book.report.study_figures import SHORT
-from inbounds.study import statistics
-from inbounds.study.analysis import generator_for, marked, scores
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import MARGINS
-from inbounds.study.second.primary import RESAMPLES
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
 
@@ -97,14 +95,8 @@ def _loud(outcomes: Outcomes) -> list[Lead]:
         if loud is None or gaussian is None:
             continue
         for endpoint in ENDPOINTS:
-            rng = generator_for("both loud", robot, endpoint)
-            first, second = (scores(each, endpoint) for each in (loud, gaussian))
-            found = statistics.difference(
-                first, second, rng, statistic="mean", resamples=RESAMPLES, missing="exclude"
-            )
-            leads.append(
-                Lead(robot, "trpo", "logit-normal", endpoint, "both loud", marked(found, loud, gaussian))
-            )
+            found = difference_of(loud, gaussian, endpoint, "both loud", robot, endpoint)
+            leads.append(Lead(robot, "trpo", "logit-normal", endpoint, "both loud", found))
     return leads
 
 
