@@ -41,6 +41,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/live/test_export.py::test_a_module_keeps_what_runs",
     ),
     Mutant(
+        "a test does not wait for its seeds",
+        "study/second/primary.py",
+        "        if whole\n        else float",
+        "        if True\n        else float",
+        "tests/study/second/test_analysis.py::test_a_secondary_test_waits_for_its_seeds_too",
+    ),
+    Mutant(
         "a quiet start forgets the box's units",
         "integrations/stable_baselines3.py",
         "policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())",

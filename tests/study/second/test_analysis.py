@@ -120,6 +120,21 @@ def test_a_verdict_waits_for_all_twenty_seeds(tmp_path) -> None:
     )  # ten were planned
 
 
+def test_a_secondary_test_waits_for_its_seeds_too(tmp_path) -> None:
+    """With ten seeds: whole where ten were planned; estimates alone where a side has twenty to come."""
+    folder = folder_in(tmp_path)
+    write_cells(folder, [c for c in SECOND["B"] if c.robot == "Hopper"])
+    done = Outcomes.read(folder, second_cells())
+    here = [row for row in second.secondary(done) if row.comparison.difference is not None]
+    assert {row.robot for row in here} == {"Hopper"}
+    whole = [all(is_whole(done, c, "Hopper") for c in (row.pair.first, row.pair.second)) for row in here]
+    assert not all(whole)
+    for row, ready in zip(here, whole, strict=True):
+        p = row.comparison.p_value, row.comparison.p_adjusted, row.p_over_everything
+        assert np.isfinite(p).all() == ready
+        assert np.isnan(p).all() != ready
+
+
 def test_doing_nothing_scores_nought(tmp_path) -> None:
     folder = folder_in(tmp_path)
     column = Column("equal", "ppo", "beta")

@@ -206,13 +206,12 @@ def _tested(outcomes: Outcomes, first: Column, second: Column, endpoint: str) ->
     """Return a secondary comparison of the second study by robot, corrected over its robots as the protocol has it."""
     gaps = {robot: gap(outcomes, first, second, robot, endpoint) for robot in ROBOTS}
     whole = {robot: all(is_whole(outcomes, column, robot) for column in (first, second)) for robot in ROBOTS}
-    # A test of which seeds are still to be run keeps its place in the correction, as one that was not run.
-    p_values = [each.p_value if whole[robot] else float("nan") for robot, each in gaps.items()]
+    adjusted = statistics.holm([each.p_value for each in gaps.values()])
     return {
         robot: Evidence(
             robot, first.algorithm, first.family, endpoint, each.difference, 2, float(p), whole[robot]
         )
-        for (robot, each), p in zip(gaps.items(), statistics.holm(p_values), strict=True)
+        for (robot, each), p in zip(gaps.items(), adjusted, strict=True)
         if each.difference is not None
     }
 

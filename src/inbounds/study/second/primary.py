@@ -107,7 +107,11 @@ def gap(
     *,
     without_diverged: bool = False,
 ) -> Gap:
-    """Compare two columns on a robot, with all finished seeds of each."""
+    """Compare two columns on a robot, with all finished seeds of each.
+
+    A test of which a seed is still to be run has an estimate and no p-value: in a correction it keeps its place, like
+    one whose cells are missing.
+    """
     a, b = (
         pooled_scores(outcomes, column, robot, endpoint, without_diverged=without_diverged)
         for column in (first, second)
@@ -116,7 +120,12 @@ def gap(
         return Gap(None, float("nan"))
     rng = generator_for("gap", *first, *second, robot, endpoint, without_diverged, version=SECOND_VERSION)
     estimate = statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")
-    p_value = statistics.permutation_test(a, b, rng, permutations=PERMUTATIONS, missing="exclude")
+    whole = all(is_whole(outcomes, column, robot) for column in (first, second))
+    p_value = (
+        statistics.permutation_test(a, b, rng, permutations=PERMUTATIONS, missing="exclude")
+        if whole
+        else float("nan")
+    )
     if not without_diverged:
         cells = [cell for column in (first, second) for cell in pooled(outcomes, column, robot)]
         estimate = marked(estimate, *cells)
@@ -146,12 +155,10 @@ def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[Prima
         all(is_whole(outcomes, column, robot) for column in (_column(law), GAUSSIAN))
         for law, _, robot in places
     ]
-    # A test of which seeds are still to be run keeps its place in the correction, as one that was not run.
-    p_values = [each.p_value if done else float("nan") for each, done in zip(gaps, whole, strict=True)]
-    adjusted = statistics.holm(p_values)
+    adjusted = statistics.holm([each.p_value for each in gaps])
     return [
-        PrimaryRow(*place, each.difference, p_value, float(p), MARGINS[place[1]][place[2]], done)
-        for place, each, p_value, p, done in zip(places, gaps, p_values, adjusted, whole, strict=True)
+        PrimaryRow(*place, each.difference, each.p_value, float(p), MARGINS[place[1]][place[2]], done)
+        for place, each, p, done in zip(places, gaps, adjusted, whole, strict=True)
     ]
 
 
