@@ -920,7 +920,14 @@ MUTANTS: tuple[Mutant, ...] = (
         "learning/networks/compiling.py",
         'function.__qualname__ = f"{function.__name__}_{digest[:16]}"',
         'function.__qualname__ = f"{function.__name__}_{len(digest)}"',
-        "tests/learning/test_compiled.py::test_what_is_kept_is_not_found_after_a_change_of_what_it_calls",
+        "tests/learning/test_compiling.py::test_what_is_kept_is_not_found_after_a_change_of_what_it_calls",
+    ),
+    Mutant(
+        "a kernel is compiled by the process that calls it",
+        "learning/networks/compiling.py",
+        "raise _NotOnDiskError",
+        "_NotOnDiskError",
+        "tests/learning/test_compiling.py::test_this_process_compiles_nothing",
     ),
     Mutant(
         "a p-value of 0.05 is called below 0.05",

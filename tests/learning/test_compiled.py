@@ -6,7 +6,6 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 import threadpoolctl
@@ -14,7 +13,7 @@ import torch
 
 from inbounds.learning import DivergedSeedWarning, PPOConfig, TrainConfig, Trainer, ppo, train
 from inbounds.learning.families.policy import FAMILIES as ALL_FAMILIES
-from inbounds.learning.networks import compiling, kernels
+from inbounds.learning.networks import kernels
 from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.training import prepare
@@ -234,24 +233,3 @@ def test_preparing_compiles_what_a_run_calls() -> None:
     assert prepare(config, PointEnv) > 0
     assert prepare(config, PointEnv) < 0.5
     assert prepare(small_config(), PointEnv) < 0.01
-
-
-def test_where_nothing_can_be_kept_it_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = numba.njit
-
-    def nowhere_to_write(**options: Any) -> Any:
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return sound(**options)
-
-    monkeypatch.setattr(compiling.numba, "njit", nowhere_to_write)
-    see = compiling.kept_on_disk(kernels.see, fast=())
-    mean, squares, seen = np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1))
-    see(np.array([[3.0]]), 1, mean, squares, seen)
-    assert mean.tolist() == [[3.0]]
-
-
-def test_what_is_kept_is_not_found_after_a_change_of_what_it_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = compiling.kept_on_disk(kernels.see, fast=()).py_func.__qualname__
-    monkeypatch.setattr(compiling.inspect, "getsource", lambda module: module.__name__)
-    assert compiling.kept_on_disk(kernels.see, fast=()).py_func.__qualname__ != before

@@ -25,6 +25,9 @@ STUDY_VERSION = 1
 never mixed."""
 SECOND_VERSION = 2
 """Of the second study, which has a protocol, an engine and seeds of its own."""
+ROUNDED_ALIKE_VERSION = 3
+"""Of the second study's columns that a fault of the code concerned, mended before but one of their cells was run
+(`results/HISTORY.md`)."""
 
 ROBOTS = ("HalfCheetah", "Hopper", "Swimmer", "Walker2d", "Ant", "Humanoid")
 """In the order in which an arm runs them."""

@@ -14,7 +14,7 @@ from itertools import product
 from types import MappingProxyType
 from typing import Any
 
-from inbounds.study.cell import LEARNING_RATES, NOISES, SECOND_VERSION
+from inbounds.study.cell import LEARNING_RATES, NOISES, ROUNDED_ALIKE_VERSION, SECOND_VERSION
 from inbounds.study.cell import LONG_GAMMA as LONG_GAMMA
 from inbounds.study.cell import ROBOTS as ROBOTS
 from inbounds.study.cell import STUDY_VERSION as STUDY_VERSION
@@ -112,7 +112,7 @@ def _second(
     **values: Any,
 ) -> list[Cell]:
     """Return the cells of columns of the second study; the policies of so many seeds are kept, on Humanoid of three."""
-    common: dict[str, Any] = {"seeds": FIRST_SEEDS, "engine": "compiled", "version": SECOND_VERSION} | values
+    common: dict[str, Any] = {"seeds": FIRST_SEEDS, "engine": "compiled"} | values
     return [
         Cell(
             arm,
@@ -122,11 +122,18 @@ def _second(
             variant,
             keeps_policies=policies > 0,
             keeps_seeds=FIRST_SEEDS[: min(policies, 3 if robot == "Humanoid" else policies)] or None,
+            version=_version(algorithm, family, free=FREE in (variant, *values.get("base", ()))),
             **common,
         )
         for family, variant in columns
         for robot in robots
     ]
+
+
+def _version(algorithm: str, family: str, *, free: bool) -> int:
+    """Return the version of a column of the second study: a fault of the code concerned one of them."""
+    concerned = (algorithm, family) == ("ppo", "logit-normal") and not free
+    return ROUNDED_ALIKE_VERSION if concerned else SECOND_VERSION
 
 
 def _noise_and_steps() -> tuple[list[Cell], list[Cell]]:
@@ -162,7 +169,7 @@ def second_cells() -> tuple[Cell, ...]:
 
     Example:
         >>> len(second_cells()), {cell.version for cell in second_cells()}
-        (108, {2})
+        (108, {2, 3})
     """
     return tuple(cell for cells in SECOND.values() for cell in cells)
 

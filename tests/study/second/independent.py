@@ -117,7 +117,7 @@ def read(folder: Path, seeds: tuple[int, ...] = TWENTY) -> dict[tuple[Column, st
     parts: dict[tuple[Column, str], list[Runs]] = {}
     for path in sorted((folder / "cells").glob("*.parquet")):
         about = json.loads(pq.read_schema(path).metadata[b"inbounds"])
-        if about["study_version"] == 2 and set(about["config"]["seeds"]) <= set(seeds):
+        if about["study_version"] in (2, 3) and set(about["config"]["seeds"]) <= set(seeds):
             parts.setdefault((_column(about), about["robot"]), []).append(_runs(path, about["config"]))
     return {key: _together(runs) for key, runs in parts.items()}
 

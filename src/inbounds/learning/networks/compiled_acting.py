@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inbounds.learning.networks import kernels
 from inbounds.learning.networks.actor_critic import ActorCritic
-from inbounds.learning.networks.compiling import kept_on_disk
+from inbounds.learning.networks.compiling import ReadFromDisk, kept_on_disk
 from inbounds.learning.networks.normalizer import RunningNormalizer
 from inbounds.learning.networks.perceptron import Mlp
 
@@ -48,11 +48,15 @@ class _Outputs:
         return out
 
 
-@functools.cache
-def _outputs() -> Any:
+def make_outputs() -> Any:
+    """Return `kernels.outputs`, to be compiled."""
     return kept_on_disk(kernels.outputs)
 
 
-@functools.cache
-def _see() -> Any:
+def make_see() -> Any:
+    """Return `kernels.see`, to be compiled."""
     return kept_on_disk(kernels.see, fast=())
+
+
+_outputs = functools.cache(functools.partial(ReadFromDisk, make_outputs))
+_see = functools.cache(functools.partial(ReadFromDisk, make_see))

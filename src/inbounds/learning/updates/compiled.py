@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib
 from collections.abc import Callable, Sequence
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from torch import Tensor
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.networks.compiled_acting import CompiledActing as CompiledActing
-from inbounds.learning.networks.compiling import bound_to, kept_on_disk
+from inbounds.learning.networks.compiling import ReadFromDisk, bound_to, kept_on_disk
 from inbounds.learning.networks.kernels import AdamNumbers, Net, kernel
 from inbounds.learning.networks.perceptron import Mlp
 from inbounds.learning.rollout import Rollout
@@ -87,7 +86,7 @@ class CompiledAdam:
         steps = _steps(rollout, advantage, return_)
         actor, critic = (self._net(i, config.minibatch_size) for i in range(2))
         batch = _batch(steps, config.minibatch_size)
-        run = ppo_passes_of(_kernels_of(policy))
+        run = ppo_passes_of(str(policy.family.kernels))
         run(steps, actor, critic, batch, order, numbers, self._numbers, self.steps)
         self.steps += len(order)
 
@@ -212,18 +211,25 @@ def _batch(steps: Steps, size: int) -> Batch:
 # ---- what is compiled
 
 
+def make_ppo_passes(family: str) -> Any:
+    """Return `kernels.ppo_passes` with the score and the entropy's slope of a family's kernels, to be compiled."""
+    of_family = importlib.import_module(family)
+    slope = bound_to(kernels.policy_slope, score=of_family.score, entropy_slope=of_family.entropy_slope)
+    return kept_on_disk(bound_to(kernels.ppo_passes, policy_slope=kernel(slope)), kernels, of_family)
+
+
+def make_value_passes() -> Any:
+    """Return `kernels.value_passes`, to be compiled."""
+    return kept_on_disk(kernels.value_passes, kernels)
+
+
 @functools.cache
-def ppo_passes_of(family: ModuleType) -> Callable[..., None]:
-    """Return `kernels.ppo_passes` with the score and the entropy's slope of a family's kernels."""
-    slope = bound_to(kernels.policy_slope, score=family.score, entropy_slope=family.entropy_slope)
-    return kept_on_disk(bound_to(kernels.ppo_passes, policy_slope=kernel(slope)), kernels, family)
+def ppo_passes_of(family: str) -> Callable[..., None]:
+    """Return `kernels.ppo_passes` for the module of a family's kernels, compiled."""
+    return ReadFromDisk(make_ppo_passes, family)
 
 
 @functools.cache
 def value_passes() -> Callable[..., None]:
     """Return `kernels.value_passes`, compiled."""
-    return kept_on_disk(kernels.value_passes, kernels)
-
-
-def _kernels_of(policy: Policy) -> ModuleType:
-    return importlib.import_module(str(policy.family.kernels))
+    return ReadFromDisk(make_value_passes)
