@@ -23,12 +23,6 @@ REFERENCE_PAGES = {
     "which_policy",
     # A robot to play with, and how far it is the study's; tests/book/live and tests/pages/test_live_robot.py hold it.
     "live_robot",
-    # Looked up beside the source, one entry at a time. It teaches nothing in order, so it has no exercises; instead
-    # every entry must have its own check (`test_every_erratum_is_checked`).
-    "errata",
-    # One generated table, without exercises. Its numbers are recomputed from the files by tests/study/test_ledger.py;
-    # here the page must show every claim (`test_the_ledger_is_generated`).
-    "claim_by_claim",
     # Pointers to what the book leaves out. It teaches nothing in order; instead every road must have been tried in
     # a cell and end in a project (`test_every_road_is_tried`).
     "what_next",
@@ -113,14 +107,20 @@ def test_every_erratum_is_checked() -> None:
             assert "**Right.**" in prose or "**Why it matters.**" in prose, label
 
 
-def test_the_ledger_is_generated() -> None:
-    """The page shows the table of all claims, and says in words what a verdict is."""
-    cells = nbformat.read(ROOT / "notebooks" / "claim_by_claim.ipynb", as_version=4).cells
-    code = [cell.source for cell in cells if cell.cell_type == "code"]
-    prose = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
-    assert any("study_pages.findings(outcomes)" in source for source in code)
-    assert any(source.strip() == "study_pages.ledger(found)" for source in code)
-    assert all(word in prose for word in ("**Supported**", "**Refuted**", "**Undecided**", "**missing**"))
+def test_the_claims_are_generated() -> None:
+    """Chapter and depth page show every claim, and say in words what a verdict is."""
+    shown = {
+        "claim_by_claim": ["study_pages.by_subject(thesis)", "study_pages.by_subject(own)"],
+        "how_a_claim_is_judged": ["study_pages.ledger(found)"],
+    }
+    for page, views in shown.items():
+        cells = nbformat.read(ROOT / "notebooks" / f"{page}.ipynb", as_version=4).cells
+        code = [cell.source.strip() for cell in cells if cell.cell_type == "code"]
+        prose = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+        assert any("found = study_pages.findings(outcomes)" in source for source in code)
+        assert set(views) <= set(code)
+        assert all(word in prose for word in ("**Supported**", "**Refuted**", "**Undecided**")), page
+        assert re.search(r"\*\*missing\*\*", prose), page
 
 
 def test_every_road_is_tried() -> None:

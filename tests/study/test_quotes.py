@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from inbounds.study.ledger import CLAIMS, Finding
-from inbounds.study.ledger.quotes import NOT_TESTED, QUOTES, not_in, quote, thesis_and_book, verdict
+from inbounds.study.ledger.quotes import ALL, NOT_TESTED, QUOTES, not_in, quote, thesis_and_book, verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 RULE = (ROOT / "results" / "JUDGED-ANEW.md").read_text(encoding="utf8")
@@ -13,7 +13,7 @@ RULE = (ROOT / "results" / "JUDGED-ANEW.md").read_text(encoding="utf8")
 
 def test_quotes_are_looked_for_word_by_word(tmp_path: Path) -> None:
     """In a made-up text of all quotes with an ending line after every third word, and in one that lacks a word."""
-    words = [word for each in QUOTES.values() for word in each.words.split()]
+    words = [word for each in ALL.values() for word in each.words.split()]
     text = " ".join(word + "\n" * (k % 3 == 0) for k, word in enumerate(words))
     assert not_in(text) == []
     name = "start"
@@ -24,7 +24,7 @@ def test_quotes_are_looked_for_word_by_word(tmp_path: Path) -> None:
         command = [sys.executable, "-m", "inbounds.study.ledger.quotes", str(tmp_path / "thesis.txt")]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stderr
-        assert (f"all {len(QUOTES)} quotes are in the text" in done.stdout) == (code == 0)
+        assert (f"all {len(ALL)} quotes are in the text" in done.stdout) == (code == 0)
 
 
 def test_each_row_belongs_to_one_tally() -> None:

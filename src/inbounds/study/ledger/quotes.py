@@ -129,6 +129,14 @@ NOT_TESTED: Mapping[str, str] = MappingProxyType(
 )
 """Row → why the run does not test the thesis's sentence."""
 
+MOST = Quote(
+    "Beta policy and Logitnormal Policy tended to surpass Gaussian policy in most of the environments.",
+    "chapter 5",
+)
+"""One sentence about two policies: it is read in the same way for both (rule 4; `inbounds.study.ledger.most`)."""
+ALL: Mapping[str, Quote] = MappingProxyType({**QUOTES, "most": MOST})
+"""Every sentence that is quoted, those of the rows first."""
+
 
 def quote(claim: Claim) -> Quote | None:
     """Return the thesis's words behind a row; None for a row that is this book's own.
@@ -170,20 +178,19 @@ def not_in(text: str) -> list[str]:
         text: of the thesis.
 
     Example:
-        >>> not_in("") == list(QUOTES)
+        >>> not_in("") == list(ALL)
         True
     """
 
     def bare(words: str) -> str:
         return re.sub(r"[\s-]+", "", words)
 
-    return [name for name, quoted in QUOTES.items() if bare(quoted.words) not in bare(text)]
+    return [name for name, quoted in ALL.items() if bare(quoted.words) not in bare(text)]
 
 
 if __name__ == "__main__":
     lacking = not_in(Path(sys.argv[1]).read_text(encoding="utf8"))
     print(
-        "\n".join(f"not in the text: {name}" for name in lacking)
-        or f"all {len(QUOTES)} quotes are in the text"
+        "\n".join(f"not in the text: {name}" for name in lacking) or f"all {len(ALL)} quotes are in the text"
     )
     sys.exit(bool(lacking))

@@ -1,0 +1,64 @@
+"""Both readings of one sentence are counted in the same way for both policies."""
+
+import numpy as np
+import pytest
+
+from inbounds.book.report.score_tables import THESIS
+from inbounds.study import StudyFolder, analysis
+from inbounds.study.analysis import Contrast
+from inbounds.study.grid import ROBOTS
+from inbounds.study.ledger import claims_named, judge
+from inbounds.study.ledger.most import NEEDED, Reading, readings
+from inbounds.study.ledger.quotes import MOST
+from inbounds.study.outcomes import Column, Outcomes
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Outcomes:
+    return Outcomes.read(StudyFolder())
+
+
+@pytest.mark.parametrize("endpoint", ["final", "area"])
+def test_the_loose_reading_is_a_difference_of_means(shipped: Outcomes, endpoint: str) -> None:
+    """From the curves, without the package's comparison."""
+    last = slice(-50, None) if endpoint == "final" else slice(None)
+    for reading in readings(shipped, "standard", endpoint):
+        higher = 0
+        for robot in ROBOTS:
+            two = [shipped.find(Column("standard", "ppo", f), robot) for f in (reading.policy, "gaussian")]
+            first, second = (np.mean([r[last].mean() for r in o.returns]) for o in two if o is not None)
+            higher += first > second
+        assert (reading.higher, reading.there) == (higher, 6)
+
+
+def test_the_strict_reading_is_what_the_ledger_counts(shipped: Outcomes) -> None:
+    """Its rows ask for as many robots, and have as many for them."""
+    for reading, row in zip(readings(shipped, "standard"), ("wins-beta", "wins-ppo"), strict=True):
+        (claim,) = claims_named([f"{row}-standard"])
+        assert claim.needed == NEEDED
+        states = [each.state for each in judge(shipped, claim).statements]
+        assert (reading.found, reading.lower) == (states.count("for"), states.count("against"))
+
+
+def test_the_words_follow_from_the_counts() -> None:
+    def words(higher: int, found: int, there: int) -> tuple[str, str]:
+        reading = Reading("beta", "final", higher, found, 0, there)
+        return reading.loose, reading.strict
+
+    assert words(4, 3, 6) == ("most", "not most")
+    assert words(4, 2, 4) == ("most", "open")
+    assert words(0, 0, 2) == ("open", "open")
+    assert words(0, 0, 3) == ("not most", "not most")
+
+
+def test_an_unfinished_robot_counts_for_neither(shipped: Outcomes) -> None:
+    for reading, policy in zip(readings(shipped, "printed"), ("beta", "logit-normal"), strict=True):
+        compared = analysis.differences(shipped, Contrast("printed", "ppo", policy, "gaussian"), "final")
+        assert reading.there == sum(each.difference is not None for each in compared.values())
+
+
+def test_the_score_sheet_quotes_the_sentence_for_both() -> None:
+    first, second = (THESIS["ppo", policy, "gaussian"] for policy in ("beta", "logit-normal"))
+    assert first == second
+    for part in first.strip("“”").split(" … "):
+        assert part in MOST.words
