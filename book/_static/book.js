@@ -34,6 +34,35 @@
   new MutationObserver(nameMode).observe(root, { attributeFilter: ["data-mode"] });
   nameMode();
 
+  /* The two layers: "read" folds the code of every cell but what stays open, "code" opens it. Pages start open, for who has no scripts. */
+  const CODE = "details.inbounds-code";
+  const showLayer = () => {
+    const open = root.dataset.layer === "code";
+    for (const fold of document.querySelectorAll(CODE)) fold.open = open || fold.matches(".stays-open");
+    root.dataset.layered = "";
+    document.querySelectorAll(".btn-layer-button").forEach((button) => { button.ariaPressed = String(open); });
+  };
+  window.inboundsSwitchLayer = () => {
+    /* What the reader looks at stays where it is. */
+    const top = (node) => node.getBoundingClientRect().top;
+    const seen = [...document.querySelectorAll("article :is(p, h1, h2, h3, li, figure, summary)")]
+      .find((node) => node.checkVisibility() && top(node) > 80);
+    const before = seen && top(seen);
+    root.dataset.layer = root.dataset.layer === "code" ? "read" : "code";
+    try { localStorage.setItem("inbounds-layer", root.dataset.layer); } catch { /* then it holds for this page */ }
+    showLayer();
+    if (seen) scrollBy({ top: top(seen) - before, behavior: "instant" });
+  };
+  showLayer();
+
+  /* Paper has no folds: all of them open before printing, and close again. */
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("article details:not([open])")];
+    for (const fold of opened) fold.open = true;
+  });
+  addEventListener("afterprint", () => { for (const fold of opened) fold.open = false; });
+
   addEventListener("load", async () => {
     await window.MathJax?.startup?.promise;
     allowBreaks();

@@ -86,7 +86,7 @@ def show(fig: Figure, alt: str) -> None:
 
 
 class AltTextRenderer:
-    """MyST-NB plugin: an image output's `alt` metadata becomes the `alt` of the page's `<img>`.
+    """MyST-NB plugin: an image output's `alt` metadata becomes the `alt` of the page's `<img>`, which is marked.
 
     MyST-NB 1.4 takes width and height from an output's metadata, but not the alt text (``NbElementRenderer.
     render_image``). It asks plugins first, so this one lets it render the image and adds what is missing.
@@ -103,4 +103,5 @@ class AltTextRenderer:
         rendered: list[Any] = renderer.render_image_inline(data) if inline else renderer.render_image(data)
         for node in rendered:
             node["alt"] = alt
+            node["classes"].append("inbounds-figure")  # book/_ext/layers.py numbers these
         return rendered

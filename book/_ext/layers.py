@@ -1,0 +1,130 @@
+"""Two layers of a page: *read*, in which code is folded to its first line, and *code*, in which it is open.
+
+* Every visible input becomes a ``<details open>``: without JavaScript all of it is open. ``book.js`` folds it in
+  *read*, and a button in the header switches the whole book. The browser keeps the choice, also from the disk.
+* *Read* is where a visitor starts: who comes for a result or a derivation finds it without scrolling past programs,
+  and one press opens them all.
+* In *read* what is built stays open: the section *Build it*, the exercises, and the cells of a chapter's program. A
+  check shows its output; its code is one press away. Cells that only draw (``hide-input``) have a fold of their own.
+* Figures get a number and a caption, which is their alt text: its first sentence, and the rest in a fold if it is long.
+"""
+
+import html
+import re
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+STAYS_OPEN = ("Build it", "Exercises", "Exercise")
+PROGRAM = "tag_program"
+LONGEST_LABEL = 60  # characters of the first line
+LONGEST_CAPTION = 180  # characters of an alt text that is shown whole
+FIGURE = "inbounds-figure"  # the class that `inbounds.book.drawing.alt_text` gives a figure
+# Read before anything is drawn: what is folded must not be seen open first.
+CHOOSE = """document.documentElement.dataset.layer = "read";
+try {
+  if (localStorage.getItem("inbounds-layer") === "code") document.documentElement.dataset.layer = "code";
+} catch {}"""
+BUTTON = {
+    "type": "javascript",
+    "javascript": "inboundsSwitchLayer()",
+    "text": "Code",
+    "label": "layer-button",
+    "tooltip": "Code of every cell: folded or open",
+}
+
+
+def raw(text: str) -> nodes.raw:
+    """Return HTML as a node."""
+    return nodes.raw("", text, format="html")
+
+
+def first_line(code: str) -> str:
+    """Return the first line that says something: no import, no blank, no lone bracket."""
+    lines = [line.strip() for line in code.splitlines() if line.strip()]
+    telling = [line for line in lines if not re.match(r"(import|from)\b|[)\]}\"']+$", line)] or lines or [""]
+    line = telling[0]
+    return line if len(line) <= LONGEST_LABEL else line[: LONGEST_LABEL - 1].rstrip() + "…"
+
+
+def opening(code: str, *, stays: bool) -> str:
+    """Return the tag and the label that stand before a folded input."""
+    count = len(code.strip().splitlines())
+    lines = f"{count} line{'' if count == 1 else 's'}"
+    kind = "inbounds-code stays-open" if stays else "inbounds-code"
+    return (
+        f'<details class="{kind}" open><summary><span class="what">Code, {lines}</span> '
+        f'<code class="first-line">{html.escape(first_line(code))}</code></summary>'
+    )
+
+
+def stays_open(cell: nodes.Element) -> bool:
+    """Whether a cell is what its page is about: built there, or part of an exercise."""
+    if PROGRAM in cell["classes"] or "tag_program-extension" in cell["classes"]:
+        return True
+    node = cell.parent
+    while node is not None:
+        title = node.next_node(nodes.title) if isinstance(node, nodes.section) else None
+        if title is not None and title.astext().startswith(STAYS_OPEN):
+            return True
+        node = node.parent
+    return False
+
+
+def fold_code(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Put every visible input into a fold that is open."""
+    if app.builder.format != "html":
+        return
+    for source in list(doctree.findall(nodes.container)):
+        cell = source.parent
+        if source.get("nb_element") == "cell_code_source" and isinstance(cell, nodes.container):
+            place = cell.index(source)
+            tag = opening(source.astext(), stays=stays_open(cell))
+            cell.children[place : place + 1] = [raw(tag), source, raw("</details>")]
+            for child in cell.children:
+                child.parent = cell
+
+
+def caption(number: int, alt: str) -> str:
+    """Return a figure's caption: what a reader hears who does not see the figure.
+
+    The sentence that is shown is hidden from screen readers, which have read it as alt text already.
+    """
+    parts = [alt] if len(alt) <= LONGEST_CAPTION else re.split(r"(?<=[.!?])\s+(?=[A-Z])", alt, maxsplit=1)
+    shown, rest = parts[0], parts[1] if len(parts) > 1 else ""
+    fold = f"<details><summary>What it shows</summary><p>{html.escape(rest)}</p></details>" if rest else ""
+    return (
+        f'<figcaption><span class="number">Figure {number}.</span> <span aria-hidden="true">{html.escape(shown)}</span>'
+        f"{fold}</figcaption>"
+    )
+
+
+def number_figures(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Give every figure of a page its number and its caption."""
+    if app.builder.format != "html":
+        return
+    figures = [image for image in doctree.findall(nodes.image) if FIGURE in image["classes"]]
+    for number, image in enumerate(figures, 1):
+        place, around = image.parent.index(image), image.parent
+        made = [raw(f'<figure class="{FIGURE}">'), image, raw(caption(number, image["alt"]) + "</figure>")]
+        around.children[place : place + 1] = made
+        for child in made:
+            child.parent = around
+
+
+def add_button(
+    app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Put the switch into the header of pages that have code."""
+    if 'class="inbounds-code' in context.get("body", ""):
+        context["header_buttons"].insert(0, dict(BUTTON))
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the handlers (called by Sphinx)."""
+    app.add_js_file(None, body=CHOOSE, priority=1)
+    app.connect("doctree-resolved", fold_code)
+    app.connect("doctree-resolved", number_figures)
+    app.connect("html-page-context", add_button, priority=950)  # the theme makes the list of buttons at 501
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,115 @@
+"""Two layers, one switch: code is folded for who reads, open for who asks for it, and open for who has no scripts."""
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from tests.pages import browser as book
+
+FOLDING = '<details class="inbounds-code" open>'
+STATES = "nodes => nodes.map((node) => [node.open, node.matches('.stays-open')])"
+SHIFT = """window.shift = 0; new PerformanceObserver((list) => {
+  for (const entry of list.getEntries()) if (!entry.hadRecentInput) window.shift += entry.value;
+}).observe({ type: 'layout-shift', buffered: true });"""
+PAGES = book.pages(FOLDING)
+FIGURES = book.pages('<figure class="inbounds-figure">')
+
+
+def folds(page: Page) -> list[list[bool]]:
+    """Of every fold whether it is open, and whether it stays so."""
+    found: list[list[bool]] = page.eval_on_selector_all("details.inbounds-code", STATES)
+    assert found
+    return found
+
+
+def test_some_page_has_code_and_figures() -> None:
+    assert PAGES
+    assert FIGURES
+
+
+def test_code_is_folded_for_readers_and_opens_by_itself(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.goto(address + PAGES[0])
+    assert all(is_open == stays for is_open, stays in folds(page))
+    fold = page.locator("details.inbounds-code:not(.stays-open)").first
+    assert fold.locator(".first-line").inner_text().strip()
+    fold.locator("summary").focus()
+    page.keyboard.press("Enter")
+    assert fold.locator(".cell_input").is_visible()
+    assert sum(is_open and not stays for is_open, stays in folds(page)) == 1
+
+
+@pytest.mark.parametrize("scheme", ["http", "file"])
+def test_switch_is_remembered_on_other_pages(context: BrowserContext, address: str, scheme: str) -> None:
+    start = address if scheme == "http" else f"{book.HTML.as_uri()}/"
+    page = context.new_page()
+    page.goto(start + PAGES[0])
+    switch = page.locator(".btn-layer-button")
+    assert switch.get_attribute("aria-pressed") == "false"
+    switch.focus()
+    page.keyboard.press("Enter")
+    assert switch.get_attribute("aria-pressed") == "true"
+    assert all(is_open for is_open, _ in folds(page))
+    page.goto(start + PAGES[-1])
+    assert all(is_open for is_open, _ in folds(page))
+    page.locator(".btn-layer-button").click()
+    assert all(is_open == stays for is_open, stays in folds(page))
+
+
+def test_without_scripts_everything_is_open(browser: Browser, address: str) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(address + PAGES[0])
+    inputs = page.locator("details.inbounds-code > .cell_input")
+    assert inputs.count() > 0
+    assert page.locator("details.inbounds-code:not([open])").count() == 0
+    assert page.locator(".btn-layer-button").is_hidden()
+    context.close()
+
+
+def test_paper_has_no_folds(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.goto(address + PAGES[0])
+    folded = page.locator("article details:not([open])")
+    before = folded.count()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert folded.count() == 0
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert folded.count() == before
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("layer", ["read", "code"])
+def test_nothing_moves_while_a_page_opens(
+    context: BrowserContext, address: str, name: str, layer: str
+) -> None:
+    page = context.new_page()
+    page.add_init_script(f"localStorage.setItem('inbounds-layer', '{layer}'); {SHIFT}")
+    page.goto(address + name, wait_until="networkidle")
+    page.evaluate(book.AT_REST)
+    assert page.evaluate("window.shift") <= 0.05
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_are_numbered_and_say_what_their_alt_text_says(
+    context: BrowserContext, address: str, name: str
+) -> None:
+    page = context.new_page()
+    page.goto(address + name)
+    told = page.eval_on_selector_all(
+        "figure.inbounds-figure",
+        """nodes => nodes.map((node) => [node.querySelector('.number').textContent, node.querySelector('img').alt,
+          [...node.querySelectorAll('[aria-hidden], details > p')].map((part) => part.textContent).join(' ')])""",
+    )
+    assert [number for number, _, _ in told] == [f"Figure {i}." for i in range(1, len(told) + 1)]
+    assert all(alt == caption for _, alt, caption in told)
+
+
+def test_icons_are_drawn_by_a_small_font(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address + PAGES[0], wait_until="networkidle")
+    assert not [url for url in asked if "fontawesome.js" in url]
+    (font,) = [url for url in asked if "webfonts" in url]
+    assert (book.HTML / font.removeprefix(address).partition("?")[0]).stat().st_size < 20_000
+    assert page.evaluate("document.fonts.check('900 16px \"Font Awesome 6 Free\"', '\\uf019')")
