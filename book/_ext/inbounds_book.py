@@ -3,7 +3,7 @@
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
-  a live robot loads two small scripts, which load the rest when the reader asks for it.
+  a live robot loads two small scripts, which load the rest when the reader asks for it; one with the study's explorer, one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
@@ -24,9 +24,11 @@ from sphinx.config import Config
 from sphinx.environment import BuildEnvironment
 
 from inbounds.book.explorables.frame import javascript_files
+from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
+STUDY_EXPLORER = 'class="inbounds-study-explorer"'
 LIVE_FOLDER = "live"  # filled by tools/build_book.py
 LIVE_ROBOT = 'class="inbounds-live-robot"'
 
@@ -42,7 +44,7 @@ def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         target = Path(app.outdir) / "_static" / FOLDER
         target.mkdir(parents=True, exist_ok=True)
-        for script in javascript_files():
+        for script in [*javascript_files(), EXPLORER_SCRIPT]:
             shutil.copy2(script, target / script.name)
 
 
@@ -54,6 +56,8 @@ def choose_scripts(
     if EXPLORABLE in context.get("body", ""):
         for script in javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
+    if STUDY_EXPLORER in context.get("body", ""):
+        app.add_js_file(f"{FOLDER}/{EXPLORER_SCRIPT.name}")
     if LIVE_ROBOT in context.get("body", ""):
         for name in ("status.js", "boot.js"):  # all else is loaded when the reader asks for it
             app.add_js_file(f"{LIVE_FOLDER}/{name}")

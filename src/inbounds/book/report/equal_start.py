@@ -20,7 +20,7 @@ from inbounds.study import statistics
 from inbounds.study.grid import AFTERWARDS, FREE, ROBOTS, second_cells
 from inbounds.study.outcomes import Column, Outcome, Outcomes
 from inbounds.study.second import GAUSSIAN, MARGINS, primary
-from inbounds.study.second.pooled import is_whole
+from inbounds.study.second.pooled import is_whole, pooled
 from inbounds.study.second.primary import BOUNDED, finding, gap
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
@@ -184,6 +184,33 @@ def quiet_starts(outcomes: Outcomes) -> list[Evidence]:
                 first = _minus(*pair, endpoint)
                 rows.append(found.get(robot) or first)
     return [row for row in rows if row is not None]
+
+
+def sides(outcomes: Outcomes, evidence: Evidence) -> tuple[list[Outcome], list[Outcome]]:
+    """Return the finished cells of both sides of a row of `laws`: the bounded law's, then the Gaussian's.
+
+    Args:
+        outcomes: of both studies, as `outcomes_of_both` returns them.
+        evidence: one of the rows that `laws` returns for them.
+
+    Returns:
+        One cell a side, two where the second study has run further seeds of it.
+
+    Example:
+        >>> from inbounds.study import StudyFolder
+        >>> both = outcomes_of_both(Outcomes.read(StudyFolder()))  # in the project's folder
+        >>> law, gaussian = sides(both, laws(both)[0])
+        >>> law[0].cell.family, gaussian[0].cell.family
+        ('beta', 'gaussian')
+    """
+    algorithm, law, robot = evidence.algorithm, evidence.law, evidence.robot
+    if evidence.study == 2:
+        columns = Column("equal", algorithm, law), Column("equal", algorithm, "gaussian", FREE)
+        first, second = (pooled(outcomes, column, robot) for column in columns)
+        return first, second
+    bounded = _quiet(outcomes, algorithm, law, robot) or _plain(outcomes, algorithm, law, robot)
+    gaussian = _quiet(outcomes, algorithm, "gaussian", robot)
+    return [each for each in (bounded,) if each], [each for each in (gaussian,) if each]
 
 
 def _primary(outcomes: Outcomes) -> Iterable[Evidence]:

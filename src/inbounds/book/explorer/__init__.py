@@ -1,0 +1,6 @@
+"""The study to choose from: robots, algorithm, families, endpoint and start, in the reader's browser.
+
+`choices` writes what every choice shows, `element` puts it on a page, `explorer.js` draws it. Nothing is computed in
+the browser but places of points: each number and each verdict is written here, by the functions that make the static
+pages.
+"""

@@ -1,0 +1,136 @@
+"""The explorer as an element of a page: choices, curves, forest and sentence; without JavaScript the static figure."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import functools
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from inbounds.book.drawing.alt_text import svg_bytes
+from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.explorables.frame import DASHES
+from inbounds.book.explorer.choices import choices, kept_of
+from inbounds.book.report.arms import Part
+from inbounds.book.report.html import NONE_FINISHED
+from inbounds.book.report.study_figures import Curve, learning_curves
+from inbounds.book.report.words import in_words
+from inbounds.book.templates import macros
+from inbounds.study.analysis import curve, estimate
+from inbounds.study.grid import COMPARED, ROBOTS
+from inbounds.study.outcomes import Outcome, Outcomes
+
+SCRIPT = Path(__file__).with_name("explorer.js")
+"""What draws a choice; in the built book a page loads it once."""
+FIRST = {
+    "start": "standard",
+    "algorithm": "ppo",
+    "endpoint": "final",
+    "families": COMPARED,
+    "robots": ROBOTS,
+}
+"""What is chosen until the reader chooses, and what the static figure shows."""
+_COLORS = {
+    "light": {"ink": "#22272d", "line": "#5f6770", "grid": "#dfe3e8", "focus": "#9a5b00", "page": "#ffffff"},
+    "dark": {"ink": "#ced6dd", "line": "#9ca4af", "grid": "#364150", "focus": "#ffd394", "page": "#14181e"},
+}
+
+
+@dataclass(frozen=True)
+class StudyExplorer:
+    """The study to choose from, in the reader's browser; a stored notebook keeps a few words.
+
+    Made by `study_explorer`, which has an example.
+    """
+
+    data: dict[str, Any]
+    """Of `choices`."""
+    static: str
+    """HTML that stands there without JavaScript and in print."""
+
+    def __repr__(self) -> str:
+        """Return a line that never changes."""
+        return "<study: to choose from, robots, algorithm, families, endpoint and start>"
+
+    def _repr_html_(self) -> str:
+        looks = {family: {"dash": DASHES[look.linestyle]} for family, look in LOOKS.items()}
+        text = json.dumps(self.data | {"looks": looks}, ensure_ascii=False, separators=(",", ":"))
+        live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+        return str(
+            macros("explorer").explorer(
+                self.data,
+                text.replace("</", "<\\/"),
+                FIRST,
+                self.static,
+                style_sheet(),
+                SCRIPT.read_text(encoding="utf-8") if live else "",
+            )
+        )
+
+
+def study_explorer(outcomes: Outcomes) -> StudyExplorer:
+    """Return the study to choose from: robots, algorithm, families, endpoint and start.
+
+    Args:
+        outcomes: of the first study, as `study_pages.shipped` reads them; the second's are read from the same folder.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study.store import StudyFolder
+        >>> study_explorer(Outcomes.read(StudyFolder(Path("no/results"))))
+        <study: to choose from, robots, algorithm, families, endpoint and start>
+    """
+    return StudyExplorer(choices(outcomes), _static(outcomes))
+
+
+def _static(outcomes: Outcomes) -> str:
+    """Return the learning curves of the first choice as a picture, with as few epochs as it takes."""
+    part = Part.of(outcomes, "standard", "ppo")
+    if not part.begun:
+        return NONE_FINISHED
+
+    def thinned(outcome: Outcome | None) -> Curve | None:
+        band = curve(outcome) if outcome else None
+        if outcome is None or band is None:
+            return None
+        kept = kept_of(len(outcome.steps))[::2]
+        low, value, high = (np.asarray(each)[kept] for each in (band.low, band.value, band.high))
+        return Curve(outcome.steps[kept], dataclasses.replace(band, low=low, value=value, high=high))
+
+    fig = learning_curves(
+        {robot: {family: thinned(o) for family, o in row.items()} for robot, row in part.begun.items()},
+        ylabel="return of training episodes",
+    )
+    finals = {
+        robot: {family: estimate(o, "final") if o else None for family, o in row.items()}
+        for robot, row in part.begun.items()
+    }
+    alt = f"Learning curves, PPO, as they come, a panel per robot. Mean final returns: {in_words(finals)}"
+    picture = base64.b64encode(svg_bytes(fig)).decode("ascii")
+    plt.close(fig)
+    return str(macros("explorer").static(picture, alt))
+
+
+@functools.cache
+def style_sheet() -> str:
+    """Return the element's style, with the families' colours for both themes.
+
+    Example:
+        >>> "--explorer-beta: #1F8277" in style_sheet()
+        True
+    """
+    blocks = []
+    for theme, selector in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
+        families = {n: look.color if theme == "light" else look.color_on_dark for n, look in LOOKS.items()}
+        variables = " ".join(
+            f"--explorer-{key}: {value};" for key, value in (_COLORS[theme] | families).items()
+        )
+        blocks.append(f"{selector}.inbounds-study-explorer {{ {variables} }}")
+    return "\n".join([*blocks, SCRIPT.with_suffix(".css").read_text(encoding="utf-8")])
