@@ -3,7 +3,8 @@
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
-  a live robot loads two small scripts, which load the rest when the reader asks for it; one with the study's explorer, one.
+  a live robot loads two small scripts, which load the rest when the reader asks for it; one with the study's explorer
+  loads one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).

@@ -215,6 +215,8 @@ def test_javascript_shows_what_python_wrote(data: dict[str, Any]) -> None:
         assert sorted(row["told"] for row in drawn) == sorted(row["told"] for row in rows)
         assert (shown["there"], shown["planned"]) == (len(rows), len(pairs) * len(chosen))
         assert bool(shown["lacking"]) == (len(rows) < len(pairs) * len(chosen))
+        planned_ones = {family for pair in planned(pick["start"], pick["algorithm"]) for family in pair}
+        assert set(shown["unplanned"]) == set(pick["families"]) - planned_ones
         for robot, curves in ((panel["robot"], panel["curves"]) for panel in shown["panels"]):
             there = data["curves"][where][robot]
             assert curves == [one for one in there if one["family"] in pick["families"]]

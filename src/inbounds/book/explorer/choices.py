@@ -162,9 +162,9 @@ def choices(outcomes: Outcomes) -> dict[str, Any]:
 
     Returns:
         robots, starts, endpoints and families by name; `epochs`, those that a curve keeps, as env steps in millions;
-        `curves` by start and algorithm, then robot; `rows` by start, algorithm and endpoint, their ends in margins; `sentences`
-        likewise, by pair, an index into `texts` for each set of robots, as bits in the order of `robots`; `pairs` that
-        are planned, with their names.
+        `curves` by start and algorithm, then robot; `rows` by start, algorithm and endpoint, their ends in margins;
+        `sentences` likewise, by pair, an index into `texts` for each set of robots, as bits in the order of `robots`;
+        `pairs` that are planned, with their names.
 
     Example:
         >>> from pathlib import Path
@@ -216,7 +216,7 @@ def _row(place: Place) -> dict[str, Any]:
 
 
 def _sentences(found: Sequence[Place], texts: dict[str, int]) -> dict[str, list[int]]:
-    """Return by pair and set of robots, bit by bit, the place of its sentence in `texts`; −1 where a robot lacks its row."""
+    """Return by pair and set of robots, as bits, the place of its sentence in `texts`; −1 where a row is missing."""
     by_pair: dict[str, list[int]] = {}
     for pair in dict.fromkeys(place.pair for place in found):
         rows = {place.row.robot: place.row for place in found if place.pair == pair}

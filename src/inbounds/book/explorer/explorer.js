@@ -43,7 +43,8 @@ inbounds.chosen = (data, choice) => {
     const curves = (data.curves[where]?.[robot] ?? []).filter((curve) => families.includes(curve.family));
     return curves.length ? [{ robot, curves }] : [];
   });
-  return { forest, said, panels, lacking, there, planned: planned.length * robots.length };
+  const unplanned = families.filter((family) => !data.pairs[where].some((pair) => pair.includes(family)));
+  return { forest, said, panels, lacking, there, planned: planned.length * robots.length, unplanned };
 };
 
 (() => {
@@ -157,8 +158,10 @@ inbounds.chosen = (data, choice) => {
       const wide = globalThis.matchMedia("(min-width: 40.01rem)").matches;
       const em = parseFloat(getComputedStyle(document.documentElement).fontSize);
       place("said").replaceChildren(...sentence(data, choice, shown));
-      place("missing").textContent = shown.lacking.length ? `${shown.there} of ${shown.planned} differences are there. Not finished: ${shown.lacking.join("; ")}.` : "";
-      place("forest").replaceChildren(...(shown.forest.length ? forest(data, shown.forest, wide ? width - 24.5 * em : width, wide) : []));
+      const strip = shown.lacking.length ? [`${shown.there} of ${shown.planned} differences are there. Not finished: ${shown.lacking.join("; ")}.`] : [];
+      if (shown.unplanned.length) strip.push(`Not planned for this start and algorithm: ${shown.unplanned.map((f) => data.families[f]).join(", ")}.`);
+      place("missing").textContent = strip.join(" ");
+      place("forest").replaceChildren(...(shown.forest.length ? forest(data, shown.forest, wide ? width - 25.25 * em : width, wide) : []));
       const columns = Math.max(1, Math.floor((width + em) / (18 * em)));
       const each = Math.floor((width - (columns - 1) * em) / columns);
       place("panels").replaceChildren(...shown.panels.map((found) => panel(data, found, choice.endpoint, each)));
