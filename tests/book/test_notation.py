@@ -22,8 +22,6 @@ RETIRED = {
     r"\\tau(?:\(S\)|_0)": "C(S)",
     r"2\^\{-b\}": r"2^{-n_{\text{bits}}}",
 }
-FIRST_EDITION = tuple(name for name in anatomy.PAGES.core if name not in anatomy.REWRITTEN)
-"""Not yet rewritten: they may still use a letter otherwise."""
 
 
 def rows(page: str) -> list[tuple[str, str]]:
