@@ -136,11 +136,28 @@ def _starts_at_one(function: Loss) -> str | None:
         return "it has the wrong sign: Adam goes downhill, so the loss is minus the surrogate"
     if _close(value, -scene.advantage.sum()):
         return "that is a sum over the minibatch; take the mean"
+    scale = scene.critic(scene.batch.obs).sub(scene.to_go).square().mean().detach()
+    known = {
+        "value_coef does not reach the critic's error: here it is 0": scale - mean,
+        "it is 0, and must not be: value_coef multiplies the critic's error alone, and the advantages come normalised "
+        "from the update": 0 * mean,
+        "the surrogate's third argument is the advantage, not to_go": -scene.to_go.mean(),
+        "the surrogate takes the advantage third and old_log_prob fourth": _of_swapped(scene),
+    }
+    for words, wrong in known.items():
+        if _close(value, wrong):
+            return words
     return (
         "the policy has not moved, so every ratio is 1 and the loss must be minus the mean advantage. Are the latents "
         "scored as they were drawn, and summed over the action's dimensions? are value_coef and entropy_coef used? "
         "here both are 0"
     )
+
+
+def _of_swapped(scene: Scene) -> Tensor:
+    """The loss of a surrogate that took the advantages for log-densities, and the other way round."""
+    ratio, weight = (scene.old_log_prob - scene.advantage).exp(), scene.old_log_prob
+    return -torch.minimum(ratio * weight, ratio.clamp(1 - EPSILON, 1 + EPSILON) * weight).mean()
 
 
 def _weighs_by_the_ratio(function: Loss) -> str | None:
@@ -223,6 +240,21 @@ def _teaches_the_critic(function: Loss) -> str | None:
     after = scene.critic(scene.batch.next_obs)
     if _close(gradient[1], scene.gradients(0.5 * (after - scene.to_go).square().mean())[1]):
         return "to_go is what batch.obs are worth: ask the critic about batch.obs, not about next_obs"
+    error = prediction - scene.to_go
+    known = {
+        "that is half the squared error: value_coef is the only factor": error.square().mean() / 4,
+        "that is the squared error times 1: multiply it by value_coef": error.square().mean(),
+        "that is a sum: take the mean of the squared errors": error.square().sum() / 2,
+        "that is the square of the mean error: square first, then take the mean": error.mean().square() / 2,
+        "that is the mean of the absolute errors: square them": error.abs().mean() / 2,
+        "the error is not squared": error.mean() / 2,
+        "the critic learns to_go, not the advantage": (prediction - scene.advantage).square().mean() / 2,
+    }
+    for words, wrong in known.items():
+        if _close(gradient[1], scene.gradients(wrong)[1]):
+            return words
+    if not gradient[1].any():
+        return "no gradient reaches the critic: detach nothing of critic(batch.obs)"
     if not _close(gradient[1], right):
         return (
             "the critic's gradient must be that of value_coef times the mean of (critic(batch.obs) − to_go)²"
@@ -241,6 +273,10 @@ def _pays_for_entropy(function: Loss) -> str | None:
         return None
     if _close(gradient, -right):
         return "the bonus has the wrong sign: the loss must fall when the entropy rises"
+    if not gradient.any():
+        return "the entropy bonus is missing: minus entropy_coef times the mean of policy.entropy(batch.obs)"
+    if _close(gradient, STEPS * right):
+        return "the entropies are summed: take their mean"
     return (
         "with no advantage, the policy's gradient must be minus entropy_coef times that of the mean entropy"
     )

@@ -6,6 +6,7 @@ the weights end.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import namedtuple
 from typing import Any
 
@@ -26,7 +27,7 @@ from inbounds.learning import (
     trpo,
 )
 
-__all__ = ["PPO", "SEED", "TRPO", "Batch", "Small", "SmallPolicy", "explained"]
+__all__ = ["FAR", "PPO", "QUIET", "SEED", "TRPO", "Batch", "Small", "SmallPolicy", "explained"]
 
 Batch = namedtuple("Batch", "obs latent reward terminated truncated next_obs")
 """The steps of a rollout, a column each, as the growing program keeps them."""
@@ -37,6 +38,10 @@ PPO = PPOConfig(
     horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.05, clip_range=0.1
 )
 TRPO = TRPOConfig(horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.0)
+FAR = dataclasses.replace(TRPO, max_kl=0.3)
+"""So far that the quadratic model fails, and the line search has to shorten the step."""
+QUIET = dataclasses.replace(TRPO, adam_eps=1e-2)
+"""An Adam that does not forget how long a gradient is, for a `Small` of so small a unit that nothing is clipped."""
 
 
 ERRORS = {
@@ -47,8 +52,9 @@ ERRORS = {
     "only for scalar outputs": "one number is wanted: a .mean() is missing",
     "element 0 of tensors": "a gradient is asked of mere numbers: create_graph=True where a gradient is differentiated "
     "again, and no .detach() of anything new",
-    "invalid values": "the policy's weights have become nan. A gain() of gradient 0 does that: is the old "
-    "log-probability a constant, .detach()?",
+    "invalid values": "the policy's weights have become nan. In PPO a piece of a single row does that, whose standard "
+    "deviation is nan: pieces have `size` rows. In TRPO a gain() of gradient 0 does: is the old log-probability a "
+    "constant, .detach()?",
     "ellipsis": "a blank further up still returns ...: write it, run its cell, and this one again",
 }
 """Words of an error of Python's → what it means in an update."""
@@ -100,6 +106,10 @@ class _Orders:
 class Small:
     """Networks of one seed, and steps that their policy drew.
 
+    Args:
+        unit: of rewards and values. With 1 every gradient of the critic's is clipped, with 0.01 none.
+        log_scale: added to log σ. Far below 0 the curvature is large beside TRPO's damping.
+
     Example:
         >>> small = Small()
         >>> before = small.weights()
@@ -108,19 +118,25 @@ class Small:
         (True, False)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, unit: float = 1.0, log_scale: float = 0.0) -> None:
+        self.unit, self.log_scale = unit, log_scale
         policy = Policy(PolicyConfig("gaussian"), -np.ones(ACT), np.ones(ACT))
         network = NetworkConfig(hidden_sizes=(8, 8), dtype="float64", policy_head_gain=0.5)
         self.networks = ActorCritic(policy, OBS, network, [torch.Generator().manual_seed(3)])
+        with torch.no_grad():
+            self.networks.critic.layers[-1].weight.mul_(unit)
+            self.networks.critic.layers[-1].bias.mul_(unit)
+            self.networks.actor.layers[-1].bias[:, ACT:] += log_scale
         actor, critic = map(_plain, self.networks.networks)
         self.policy, self.critic = SmallPolicy(actor), nn.Sequential(critic, nn.Flatten(0))
+        self.actor_size = sum(p.numel() for p in actor.parameters())
         self.batch = self._steps()
 
     def _steps(self) -> Batch:
         generator = torch.Generator().manual_seed(9)
         obs, next_obs = torch.randn(2, STEPS, OBS, generator=generator, dtype=torch.float64)
         noise = torch.randn(STEPS, ACT, generator=generator, dtype=torch.float64)
-        reward = 2 * torch.randn(STEPS, generator=generator, dtype=torch.float64) + 1
+        reward = self.unit * (2 * torch.randn(STEPS, generator=generator, dtype=torch.float64) + 1)
         ends = torch.zeros(2, STEPS, dtype=torch.float64)
         ends[0, [10, 40]], ends[1, [25]] = 1.0, 1.0
         next_obs[:-1] = torch.where(ends.sum(0)[:-1, None] > 0, next_obs[:-1], obs[1:])
@@ -167,7 +183,7 @@ class Small:
     def after_the_packages(self, config: PPOConfig | TRPOConfig) -> Tensor:
         """Return the weights `[P]` after the package's update, of PPO or of TRPO; these networks stay as they are."""
         algorithm: Any = ppo if isinstance(config, PPOConfig) else trpo
-        networks, rollout = Small().networks, self.rollout()
+        networks, rollout = Small(self.unit, self.log_scale).networks, self.rollout()
         torch.manual_seed(SEED)
         algorithm.update(networks, algorithm.make_optimizer(networks, config), rollout, [_Orders()], config)
         return torch.cat([p.detach().flatten() for net in networks.networks for p in net.parameters])
@@ -176,7 +192,7 @@ class Small:
         """Return the weights `[P]` after PPO's update with one mistake; the networks are moved.
 
         Args:
-            flaw: a key of `inbounds.book.exercises.ppo.MISTAKES`' values; "" is none.
+            flaw: a value of `inbounds.book.exercises.ppo.MISTAKES`; "" is none.
         """
         advantage, to_go = self._advantages()
         clip_range = 0.2 if flaw in ("clip range", "no coefficients") else PPO.clip_range
@@ -185,13 +201,15 @@ class Small:
         if flaw == "whole":
             advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         torch.manual_seed(SEED)
-        order = torch.randperm(STEPS)
+        order = torch.arange(STEPS) if flaw == "unshuffled" else torch.randperm(STEPS)
         if flaw == "swapped":
             advantage, to_go = to_go, advantage
         for number in range(1 if flaw == "one pass" else 3):
+            if flaw == "density of each pass":
+                old = self.policy.log_prob(self.batch.obs, self.batch.latent).detach()
             if flaw == "each pass":
                 advantage, to_go = self._advantages()
-            if number and flaw != "one order":
+            if number and flaw not in ("one order", "unshuffled"):
                 order = torch.randperm(STEPS)
             for piece in order.split(16):
                 if flaw == "each step":
@@ -207,10 +225,38 @@ class Small:
                 error = (1.0 if flaw == "value coef" else 0.5) * (self.critic(obs) - target).square().mean()
                 if flaw != "accumulate":
                     adam.zero_grad()
-                (error - gain - bonus * self.policy.entropy(obs).mean()).backward()
+                loss = error - gain - bonus * self.policy.entropy(obs).mean()
+                (-loss if flaw == "uphill" else loss).backward()
                 self._clip(flaw)
                 adam.step()
         return self.weights()
+
+    def critic_after_a_flawed(self, flaw: str, config: TRPOConfig) -> Tensor:
+        """Return the critic's weights `[P]` after TRPO's regression with one mistake; the critic is moved.
+
+        Args:
+            flaw: a value of `inbounds.book.trpo_updates.MISTAKES`; "" is none.
+            config: of the step.
+        """
+        target, adam = self._advantages()[flaw != "advantages"], self.adam(config)
+        target = _normalized(target) if flaw == "targets" else target
+        torch.manual_seed(SEED)
+        order = torch.arange(STEPS) if flaw == "unshuffled" else torch.randperm(STEPS)
+        for number in range(1 if flaw == "one pass" else 3):
+            if number and flaw not in ("one order", "unshuffled"):
+                order = torch.randperm(STEPS)
+            target = self._advantages()[1] if flaw == "each pass" else target
+            for piece in order.split(16):
+                index = slice(None) if flaw == "no pieces" else piece
+                value = self.critic((self.batch.next_obs if flaw == "next" else self.batch.obs)[index])
+                error = (value[:, None] if flaw == "broadcast" else value) - target[index]
+                square = error.abs() if flaw == "absolute" else error.square()
+                loss = {"sum": square.sum(), "half": square.mean() / 2, "twice": 2 * square.mean()}
+                adam.zero_grad()
+                loss.get(flaw, square.mean()).backward()
+                self._clip("free" if flaw == "free" else "")
+                adam.step()
+        return torch.cat([p.detach().flatten() for p in self.critic.parameters()])
 
     def _advantages(self) -> tuple[Tensor, Tensor]:
         """GAE and its targets `[T]`, with the critic as it is."""
@@ -232,8 +278,14 @@ class Small:
 
 
 def _normalized(x: Tensor, flaw: str = "") -> Tensor:
-    spread = x.std(correction=0 if flaw == "population" else 1) + 1e-8
-    return x - x.mean() / spread if flaw == "bracket" else (x - x.mean()) / spread
+    spread, centred = x.std(correction=0 if flaw == "population" else 1) + 1e-8, x - x.mean()
+    wrong = {
+        "bracket": x - x.mean() / spread,
+        "centred": centred,
+        "scaled": x / spread,
+        "variance": centred / x.var(),
+    }
+    return wrong.get(flaw, centred / spread)
 
 
 def _plain(net: Any) -> nn.Sequential:

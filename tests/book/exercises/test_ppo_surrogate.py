@@ -55,7 +55,7 @@ def surrogate_of(function: Callable) -> Callable:
         (lambda w, a, e: -capped(w, a, e).mean(), "minus the surrogate"),
         (lambda w, a, e: capped(w, a, e).sum(), "take the mean"),
         (capped, "one number is wanted"),
-        (lambda w, a, e: capped(w, a, 0.2).mean(), "expected"),
+        (lambda w, a, e: capped(w, a, 0.2).mean(), "not always 0.2"),
     ],
 )
 def test_known_mistakes_of_the_surrogate_are_named(wrong: Callable, words: str) -> None:

@@ -82,6 +82,25 @@ def advantages(function: Callable[..., Any]) -> Judgement:
             "λ is missing: what follows counts γλ, not γ": wrong(no_lam=True),
             "a step can have both flags, and 1 − (terminated + truncated) is −1 there: multiply by (1 − terminated) "
             "and by (1 − truncated)": np.stack([added, added + value]),
+            "γ is missing in the residual: it multiplies the value of next_obs": wrong(undiscounted=True),
+            "the residual *subtracts* the value of batch.obs": wrong(worth_added=True),
+            "the sign of the residual is wrong: r + γ V(next) − V": np.stack([-right[0], value - right[0]]),
+            "the loop must run from the last row to the first: an advantage needs the next one": wrong(
+                forwards=True
+            ),
+            "γλ and the masks multiply what follows, not the residual too": wrong(faded=True),
+            "the flags of a step decide about what follows *that* step: row t, not row t + 1": wrong(
+                late=True
+            ),
+            "what the critic learns is the advantage plus the value, not the reward plus the next value": np.stack(
+                [right[0], reward + gamma * (1 - terminated) * after]
+            ),
+            "the advantages are normalised later, in the update: leave them as they are here": np.stack(
+                [(right[0] - right[0].mean()) / (right[0].std(ddof=1) + 1e-8), right[1]]
+            ),
+            "the value of next_obs is not that of the next row: behind an end the next row is a new episode": wrong(
+                rows=True
+            ),
             "the loop runs backwards, so the list is the wrong way round: turn it": np.stack(
                 [right[0][::-1], right[0][::-1] + value]
             ),
@@ -129,6 +148,19 @@ def _flags_added(
     return total
 
 
+def _by_recursion(
+    residual: Any, terminated: Any, truncated: Any, rate: float, forwards: bool, faded: bool, late: bool
+) -> np.ndarray:
+    """GAE by its recursion, in the wrong direction, with a factor too many, or with the next row's flags."""
+    keep = rate * (1 - terminated) * (1 - truncated)
+    keep = np.append(keep[1:], 0.0) if late else keep
+    total, later, rows = np.zeros(len(residual)), 0.0, range(len(residual))
+    for t in rows if forwards else reversed(rows):
+        later = keep[t] * (residual[t] + later) if faded else residual[t] + keep[t] * later
+        total[t] = later
+    return total
+
+
 def _estimates(
     value: Any,
     after: Any,
@@ -145,10 +177,20 @@ def _estimates(
     no_gamma: bool = False,
     no_lam: bool = False,
     alone: bool = False,
+    undiscounted: bool = False,
+    worth_added: bool = False,
+    forwards: bool = False,
+    faded: bool = False,
+    late: bool = False,
+    rows: bool = False,
 ) -> np.ndarray:
     """GAE by its definition, a sum for each step; flaws on demand."""
     blind = (terminated if not end_goes_on else 0 * terminated) + (truncated if cut_ends else 0.0)
-    residual = reward + gamma * (1 - blind) * after - value
+    after = np.append(value[1:], after[-1]) if rows else after
+    residual = reward + (1.0 if undiscounted else gamma) * (1 - blind) * after
+    residual = residual + value if worth_added else residual - value
+    if forwards or faded or late:
+        return _by_recursion(residual, terminated, truncated, gamma * lam, forwards, faded, late)
     stops = (0 if leaks else 1) * (terminated + (0 if leaks_at_cuts else 1) * truncated) > 0
     weight = (1.0 if no_gamma else gamma) * (1.0 if no_lam else lam)
     total = np.zeros(len(reward))

@@ -78,14 +78,16 @@ def judge_cases(function: Callable[..., Any], cases: list[Case], success: str) -
             answer = detached(function(*case.arguments))
         except Exception as error:
             return Judgement(name, False, f"it raised {type(error).__name__}: {error}")
-        if answer is ... or answer is None or answer is NotImplemented:
+        if answer is None:
+            return Judgement(name, None, "it returns nothing: write it, with a return at the end")
+        if answer is ... or answer is NotImplemented:
             return Judgement(name, None, "write it, and run this cell again")
         if agrees(answer, case.expected, case.rtol):
             continue
         for diagnosis, wrong in case.mistakes.items():
             if agrees(answer, wrong, case.rtol):
                 return Judgement(name, False, diagnosis)
-        return Judgement(name, False, f"{case.hint}: expected {brief(case.expected)}, got {brief(answer)}")
+        return Judgement(name, False, f"{case.hint}: {_beside(answer, case.expected, case.rtol)}")
     return Judgement(name, True, success)
 
 
@@ -183,6 +185,20 @@ def agrees(answer: Any, expected: Any, rtol: float) -> bool:
     return answer.shape == expected.shape and np.allclose(
         answer, expected, rtol=rtol, atol=0.0, equal_nan=True
     )
+
+
+def _beside(answer: Any, expected: Any, rtol: float) -> str:
+    """What was expected and what came; of two arrays alike in shape the first entry that differs."""
+    try:
+        found, right = np.asarray(answer, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = right = np.zeros(())
+    if found.shape != right.shape or found.size < 2:
+        return f"expected {brief(expected)}, got {brief(answer)}"
+    wrong = ~np.isclose(found, right, rtol=rtol, atol=0.0, equal_nan=True)
+    place = tuple(int(i) for i in np.argwhere(wrong)[0])
+    where = f"{wrong.sum()} of {right.size} numbers differ, first that at {list(place)}"
+    return f"{where}: expected {right[place]:.6g}, got {found[place]:.6g}"
 
 
 def brief(value: Any) -> str:

@@ -95,6 +95,20 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
                 0.0,
             ],
             "the log-ratio is not exponentiated": both(np.log(ratio), step),
+            "a ratio of *densities*: subtract the log-densities, then take the exponential": both(
+                (log_prob + shift * step) / old, step / old
+            ),
+            "a *quotient* of densities: subtract before you take the exponential, not after": both(
+                np.exp(log_prob + shift * step) - np.exp(old), np.exp(log_prob + shift * step) * step
+            ),
+            "the mean of the products, not the product of the means": [
+                float(ratio.mean() * advantage.mean()),
+                float((ratio * step).mean() * advantage.mean()),
+            ],
+            "the advantages are normalised in the update: leave them as they are here": [
+                float(np.mean(each * (advantage - advantage.mean()) / (advantage.std(ddof=1) + 1e-8)))
+                for each in (ratio, ratio * step)
+            ],
             "old and new are swapped": both(1 / ratio, -step / ratio),
             "the sign is wrong: this is to be ascended": [-x for x in right],
             "that is the sum over the batch: take its mean": [steps * x for x in right],

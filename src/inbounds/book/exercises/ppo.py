@@ -44,10 +44,12 @@ def policy(make: Callable[..., Any]) -> Judgement:
         loc, log_scale = outputs.chunk(2, -1)
         return Normal(loc, log_scale.exp())
 
-    box = SimpleNamespace(low=-np.ones(2), high=np.ones(2))
+    box = SimpleNamespace(
+        low=-np.ones(2), high=np.ones(2)
+    )  # a map that is not the identity: latents are no actions
     obs, latent = torch.linspace(-1, 1, 15).reshape(5, 3), torch.linspace(-2, 2, 10).reshape(5, 2)
     try:
-        made = make(3, box, law, lambda z, low, high: z)
+        made = make(3, box, law, lambda z, low, high: np.tanh(z))
         if not hasattr(made, "net"):
             return Judgement(name, None, "write it, and run this cell again")
         outputs = made.net(obs).detach()
@@ -71,13 +73,18 @@ def policy(make: Callable[..., Any]) -> Judgement:
         answer = found[method]
         if answer is None or answer is ...:
             return Judgement(name, None, f"write {method}, and run this cell again")
-        if complaint := _of_a_law(method, answer, each):
+        executed = (
+            -((latent.tanh() - loc) ** 2) / 2 / torch.exp(2 * log_scale) - log_scale - np.log(2 * np.pi) / 2
+        )
+        if complaint := _of_a_law(method, answer, each, executed):
             return Judgement(name, False, f"{method}: {complaint}")
+        if not answer.requires_grad:
+            return Judgement(name, False, f"{method}: no gradient reaches the policy: detach nothing here")
     return Judgement(name, True, "one number a step: the motors' sum")
 
 
-def _of_a_law(method: str, answer: Any, each: Tensor) -> str:
-    """What is wrong with a method's answer, given the right one of each motor `[B, A]`."""
+def _of_a_law(method: str, answer: Any, each: Tensor, executed: Tensor) -> str:
+    """What is wrong with a method's answer, given the right one of each motor `[B, A]`, and that of an action."""
     if not isinstance(answer, Tensor):
         return f"a tensor is wanted, got {type(answer).__name__}"
     total, mean = each.sum(-1), each.mean(-1)
@@ -89,9 +96,15 @@ def _of_a_law(method: str, answer: Any, each: Tensor) -> str:
         return ""
     if torch.allclose(answer, mean, rtol=1e-4, atol=1e-5):
         return "that is the mean over the motors; independent motors *add*"
+    if method == "log_prob" and torch.allclose(answer, total.exp(), rtol=1e-4):
+        return "that is the density: leave out the exponential"
+    if method == "log_prob" and torch.allclose(answer, executed.sum(-1), rtol=1e-4):
+        return "score the latent as it was drawn, not the action that became of it"
+    if method == "entropy" and torch.allclose(answer, -total, rtol=1e-4):
+        return "the sign is wrong: a law's own entropy has no minus before it"
     if method == "kl":
         return "it must be KL(old‖new): the old law comes first, and the new one is that of self.net(obs)"
-    return "the value is wrong: ask the law of self.net(obs)"
+    return "the value is wrong: ask self.law(self.net(obs)), and about the latent as it is"
 
 
 def surrogate(function: Callable[..., Any]) -> Judgement:
@@ -109,6 +122,7 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
     def case(ratio: list[float], advantage: list[float], clip_range: float) -> Case:
         w, a = np.array(ratio), np.array(advantage)
         clipped = np.clip(w, 1 - clip_range, 1 + clip_range)
+        old = np.linspace(-1, 1, len(w))
         first, right = w * a, a + clip_range * np.abs(a)  # a capped gain, unlike the chapter's solution
         mistakes = {
             "there is no ratio in it: exp(new log-probability − old)": a,
@@ -119,20 +133,39 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
             "take the smaller of the two products, not of the two ratios: it matters where Â < 0": a
             * np.minimum(w, clipped),
             "that is the larger of the two: the surrogate is pessimistic": np.maximum(first, clipped * a),
+            "a *quotient* of densities: subtract before you take the exponential, not after": _least(
+                np.exp(old + np.log(w)) - np.exp(old), a, clip_range
+            ),
+            "the clip has two ends, 1 − ε and 1 + ε": np.minimum(first, np.minimum(w, 1 + clip_range) * a),
+            "the ratio is clipped to 1 − ε … 1 + ε, about 1 and not about 0": np.minimum(
+                first, np.clip(w, -clip_range, clip_range) * a
+            ),
+            "the ratio is clipped, not its logarithm": np.minimum(
+                first, np.exp(np.clip(np.log(w), -clip_range, clip_range)) * a
+            ),
+            "the ratio is clipped, not its product with the advantage": np.minimum(
+                first, np.clip(first, 1 - clip_range, 1 + clip_range)
+            ),
+            "ε is clip_range, and not always 0.2": _least(w, a, 0.2),
             "that is minus the surrogate: it is maximised; the loss takes the minus": -np.minimum(
                 first, right
             ),
         }
-        old = np.linspace(-1, 1, len(w))
         quotient = (old + np.log(w)) / old
-        mistakes["a ratio of *densities*: subtract the log-densities, then take the exponential"] = (
-            np.minimum(quotient * a, np.clip(quotient, 1 - clip_range, 1 + clip_range) * a)
+        mistakes["a ratio of *densities*: subtract the log-densities, then take the exponential"] = _least(
+            quotient, a, clip_range
         )
         expected = np.minimum(first, right)
         values = {words: wrong.mean() for words, wrong in mistakes.items()}
         if len(w) > 1:
             values |= {"that is a sum over the batch: take the mean": expected.sum()}
+            centred = (a - a.mean()) / (a.std(ddof=1) + 1e-8)
+            wrong = _least(w, centred, clip_range).mean()
+            values |= {"the advantages come normalised, or not; leave them as they are here": wrong}
         values |= {"one number is wanted, the mean over the batch": expected}
+        values["a number a step meets a number a step in another shape: [B, 1] and [B] make [B, B]"] = (
+            np.mean([_least(w, each, clip_range) for each in a])
+        )
         new, before = torch.tensor(old + np.log(w), requires_grad=True), torch.tensor(old)
         batch = SimpleNamespace(obs=torch.zeros(len(w), 3), latent=torch.zeros(len(w), 2))
 
@@ -143,13 +176,18 @@ def surrogate(function: Callable[..., Any]) -> Judgement:
         policy = SimpleNamespace(log_prob=log_prob, new=new, slope=w * a * (first <= right) / len(w))
         return Case((policy, batch, torch.tensor(a), before, clip_range), expected.mean(), values)
 
-    six = [0.5, 1.05, 1.7, 0.5, 1.05, 1.7], [2.0, 2.0, 2.0, -1.0, -1.0, -1.0]
-    cases = [case([1.05], [2.0], 0.2), case(*six, 0.2), case(*six, 0.02)]
+    six = [0.5, 1.05, 1.7, 0.5, 1.05, 1.7], [2.0, 1.5, 3.0, -1.0, -0.5, -2.0]
+    cases = [case([1.05, 0.9], [2.0, 1.0], 0.2), case(*six, 0.2), case(*six, 0.02)]
     verdict = judge_cases(function, cases, "right, in all six cases")
     complaint = "log_prob takes batch.obs first, then batch.latent" if swapped else ""
     if verdict.passed and not complaint:
         complaint = _of_a_slope(function, cases[1].arguments)
     return Judgement(verdict.exercise, False, complaint) if complaint else verdict
+
+
+def _least(ratio: np.ndarray, advantage: np.ndarray, clip_range: float) -> np.ndarray:
+    """The smaller of the two products, `[B]`, whatever the ratio is."""
+    return np.minimum(ratio * advantage, np.clip(ratio, 1 - clip_range, 1 + clip_range) * advantage)
 
 
 def _of_a_slope(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
@@ -222,6 +260,8 @@ def update(function: Callable[..., Any]) -> Judgement:
     if torch.equal(before, after) and taken:
         order = "zero_grad, backward, clip_grad_norm_, adam.step(), in this order"
         return Judgement(name, False, f"Adam took steps without a gradient, and nothing moved: {order}")
+    if torch.equal(before, after) and any(each.grad is not None for each in small.policy.net.parameters()):
+        return Judgement(name, False, "there are gradients, and Adam took no step: adam.step() is missing")
     if torch.equal(before, after):
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
     if _same(after, small.after_the_packages(PPO)):
@@ -230,8 +270,9 @@ def update(function: Callable[..., Any]) -> Judgement:
         if _same(after, Small().after_a_flawed(flaw)):
             return Judgement(name, False, mistake)
     hints = (
-        "is torch.randperm called once a pass, and for nothing else? are the advantages and the old log-probabilities "
-        "computed once, before the first step?"
+        "is torch.randperm called once a pass, and for nothing else? does each piece take its own rows of everything? "
+        "are the advantages and the old log-probabilities computed once, before the first step? is the gradient's norm "
+        "cut with clip_grad_norm_?"
     )
     return Judgement(
         name, False, f"the weights end elsewhere than the package's, in no way that is known: {hints}"
@@ -244,6 +285,9 @@ def _same(a: Tensor, b: Tensor) -> bool:
 
 MISTAKES: Mapping[str, str] = {
     "the advantages are not normalised": "raw",
+    "normalized subtracts the mean and does not divide: by x.std() + 1e-8": "centred",
+    "normalized divides and does not subtract the mean": "scaled",
+    "normalized divides by the variance: take the standard deviation, x.std()": "variance",
     "the standard deviation is x.std(), torch's own, which divides by n − 1": "population",
     "a bracket is missing in normalized: (x − mean) is divided, not the mean alone": "bracket",
     "the critic's targets are normalised too: only the advantages are": "targets",
@@ -253,8 +297,11 @@ MISTAKES: Mapping[str, str] = {
     "advantages(batch, critic) returns the advantages first, then the critic's targets": "swapped",
     "advantages are normalised over the whole batch; do it in each minibatch": "whole",
     "the steps are shuffled once; shuffle anew in each pass": "one order",
+    "the rows are not shuffled: torch.randperm in each pass": "unshuffled",
     "only one pass is made over the data": "one pass",
     "the old log-probabilities move along, and every ratio is 1: take them once, before the passes": "own density",
+    "the old log-probabilities are computed anew in each pass: once, before the first": "density of each pass",
+    "it climbs the loss: Adam's step goes down, so nothing needs a minus here": "uphill",
     "gradients add up from step to step: zero_grad before backward": "accumulate",
     "the gradient is not clipped: one norm over both networks, at most 0.5": "free",
     "the gradient is clipped for each network alone: one norm over both": "apart",

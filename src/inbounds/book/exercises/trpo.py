@@ -14,9 +14,10 @@ import torch
 from torch import Tensor
 from torch.nn.utils import parameters_to_vector
 
+from inbounds.book import trpo_updates
 from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
-from inbounds.book.small_updates import SEED, TRPO, Small, explained
-from inbounds.book.trpo_checks import CHECKS, DAMPING, MAX_KL, Step, parallel, problem, round_problem
+from inbounds.book.small_updates import explained
+from inbounds.book.trpo_checks import CHECKS, DAMPING, MAX_KL, Problem, Step, parallel, problem, round_problem
 
 __all__ = [
     "conjugate_gradient",
@@ -88,14 +89,21 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
         return space @ torch.linalg.solve(space.T @ matrix @ space, space.T @ b)
 
     def walk(
-        k: int, beta: Callable[..., Any], shrink: Callable[[Tensor, Tensor], Tensor] | None = None
+        k: int,
+        beta: Callable[..., Any] = lambda new, old, length: new / old,
+        shrink: Callable[[Tensor, Tensor], Tensor] = lambda image, direction: image,
+        along: Callable[[Tensor, Tensor, Tensor], Tensor] = lambda direction, image, residual: direction,
+        alpha: Callable[[Tensor, Tensor, Tensor], Tensor] = lambda square, direction, image: (
+            square / (direction @ image)
+        ),
+        once: bool = False,
     ) -> Tensor:
         x, residual, direction = torch.zeros_like(b), b, b
         for _ in range(k):
-            image, square = matrix @ direction, residual @ residual
-            x = x + square / (direction @ image) * direction
-            length = square / (direction @ image)
-            residual = residual - length * (shrink(image, direction) if shrink else image)
+            image, square = matrix @ direction, b @ b if once else residual @ residual
+            length = alpha(square, direction, image)
+            x = x + length * along(direction, image, residual)
+            residual = residual - length * shrink(image, direction)
             direction = residual + beta(residual @ residual, square, length) * direction
         return x
 
@@ -115,9 +123,28 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
                 k, lambda new, old, length: length
             ),
             "the residual falls by the length times the *image* of the direction, not the direction": walk(
-                k, lambda new, old, length: new / old, lambda image, direction: direction
+                k, shrink=lambda image, direction: direction
             ),
-            "the number of iterations is not used": best(4 if k == 2 else 2),
+            "the residual falls: subtract α · image from it": walk(k, shrink=lambda image, direction: -image),
+            "x goes along the direction, not along its image": walk(
+                k, along=lambda direction, image, residual: image
+            ),
+            "x goes along the direction, not along the residual": walk(
+                k, along=lambda direction, image, residual: residual
+            ),
+            "α is upside down": walk(k, alpha=lambda square, direction, image: (direction @ image) / square),
+            "α divides by direction · image, not by image · image": walk(
+                k, alpha=lambda square, direction, image: square / (image @ image)
+            ),
+            "α has the *squared* residual above the line, residual @ residual, not its root": walk(
+                k, alpha=lambda square, direction, image: square**0.5 / (direction @ image)
+            ),
+            "the old direction is *added* to the new residual": walk(k, lambda new, old, length: -new / old),
+            "the squared residual is computed once: it changes in every iteration": walk(k, once=True),
+            "x starts at 0, not at b": b + best(k),
+            "it returns after one iteration: the return belongs behind the loop": best(1),
+            "the number of iterations is not used": best(2),
+            "the number of iterations is not used: range(iterations)": best(4),
             "the sign is wrong: it solves for −b": -best(k),
             "that is the residual: return x": b - matrix @ best(k),
         }
@@ -153,9 +180,21 @@ def natural_step(function: Callable[..., Any]) -> Judgement:
     posed = problem()
     right, weights = posed.full(), posed.weights()
     x, plain = torch.linalg.solve(posed.damped, posed.gradient), posed.gradient
-    undamped = torch.linalg.solve(posed.fisher, posed.gradient)
+    undamped, image = torch.linalg.solve(posed.fisher, posed.gradient), posed.damped @ plain
     mistakes = {
         "½ xᵀ(F + cI)x is max_kl/2: there is a 2 under the root": right / 2**0.5,
+        "the fraction under the root is upside down": ((x @ plain) / (2 * MAX_KL)).sqrt() * x,
+        "the 2 stands on the wrong side of the fraction": right / 2,
+        "under the root stands x · product(x), not b · b": (2 * MAX_KL / (plain @ plain)).sqrt() * x,
+        "under the root stands x · product(x), not b · product(b)": (
+            2 * MAX_KL / (plain @ posed.damped @ plain)
+        ).sqrt()
+        * x,
+        "that is the product with b: solve with conjugate_gradient": (
+            2 * MAX_KL / (image @ posed.damped @ image)
+        ).sqrt()
+        * image,
+        "b is the gradient of gain(): that of mean_kl() is 0 here": right * torch.nan,
         "the root is missing": 2 * MAX_KL / (x @ plain) * x,
         "that is x: give it the length √(2 max_kl / xᵀ(F + cI)x)": x,
         "the Euclidean length is √(2 max_kl): measure with the damped product": (2 * MAX_KL / (x @ x)).sqrt()
@@ -175,7 +214,10 @@ def natural_step(function: Callable[..., Any]) -> Judgement:
         ).sqrt()
         * plain,
     }
-    hint = "½ xᵀ(F + cI)x = max_kl and (F + cI) x ∥ b do not both hold"
+    hint = (
+        "½ xᵀ(F + cI)x = max_kl and (F + cI) x ∥ b do not both hold. Does product(v) return Fv + damping · v? does "
+        "conjugate_gradient take its ten iterations?"
+    )
     case = Case((*posed.of(weights), weights, MAX_KL, DAMPING), right, mistakes, hint)
     verdict = judge_cases(function, [case], "right: direction and length are those of dense algebra")
     if verdict.passed and not torch.equal(parameters_to_vector(weights).detach(), posed.start):
@@ -226,7 +268,27 @@ def line_search(function: Callable[..., Any]) -> Judgement:
                 "a shorter step is added to weights that have moved already: every length starts at the *old* weights. "
                 "Keep a copy of them; list(weights) is none, parameters_to_vector(weights) is one"
             )
-        return CHECKS["trust"](function)
+        return CHECKS["trust"](function) or halves(function, round_problem(steep=950.0))
+
+    def improvement(function: Step) -> str:
+        full = round_problem().full()
+        bend = (
+            round_problem().gradient @ full / (0.6 * full @ full)
+        ).item()  # half the step gains less than a quarter
+        return CHECKS["improvement"](function) or halves(function, round_problem(bend=bend))
+
+    def halves(function: Step, posed: Problem) -> str:
+        """Whether the first of full, full/2, … that will do was taken."""
+
+        def will_do(length: float) -> bool:
+            there = posed.start + length * posed.full()
+            return bool(posed.mean_kl(there) <= MAX_KL and posed.surrogate(there) > posed.level)
+
+        first = next(length for length in (0.5**k for k in range(10)) if will_do(length))
+        taken = (posed.moved(function).norm() / posed.full().norm()).item()
+        if abs(taken - first) < 1e-6:
+            return ""
+        return f"of the full step, of 1/2, 1/4, … of it the *first* that will do is {first:g}; yours is {taken:.2g}"
 
     def answered() -> bool:
         posed = round_problem()
@@ -234,8 +296,7 @@ def line_search(function: Callable[..., Any]) -> Judgement:
         return step(*posed.of(weights), weights, MAX_KL, DAMPING) is not ...
 
     step.__name__ = getattr(function, "__name__", "line_search")
-    own: dict[str, Step] = {"length": whole, "trust": trust}
-    checks = own | {name: CHECKS[name] for name in ("improvement", "refusal")}
+    checks = {"length": whole, "trust": trust, "improvement": improvement, "refusal": CHECKS["refusal"]}
     return judge_by_checks(step, checks, answered)
 
 
@@ -250,40 +311,12 @@ def update(function: Callable[..., Any]) -> Judgement:
         >>> update(lambda *arguments, **options: None)
         … not answered: <lambda>: the weights have not moved: write it, and run this cell again
     """
-    name, small = getattr(function, "__name__", "your function"), Small()
-    before = small.weights()
-    torch.manual_seed(SEED)
+    name = getattr(function, "__name__", "your function")
     try:
-        function(small.policy, small.critic, small.adam(TRPO), small.batch, max_kl=0.01, passes=3, size=16)
+        complaint = trpo_updates.complaint(function)
     except Exception as error:
         return Judgement(name, False, explained(error))
-    after, right = small.weights(), small.after_the_packages(TRPO)
-    if torch.equal(before, after):
+    if complaint is None:
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
-    split = sum(p.numel() for p in small.policy.net.parameters())
-    same = [
-        torch.allclose(a, b, rtol=1e-6, atol=1e-8)
-        for a, b in ((after[:split], right[:split]), (after[split:], right[split:]))
-    ]
-    still = [torch.equal(after[:split], before[:split]), torch.equal(after[split:], before[split:])]
-    if all(same):
-        return Judgement(name, True, "its weights are the package's, of the policy and of the critic")
-    if still[0]:
-        return Judgement(name, False, "the policy has not moved: natural_step, then line_search")
-    if still[1]:
-        return Judgement(
-            name, False, "the critic has not learned: passes of `step` over shuffled minibatches"
-        )
-    if not same[0]:
-        hints = (
-            "are the advantages the *first* of the two that `advantages` returns, and normalised over the whole batch? "
-            "is the old policy detached? does the value regression leave it alone?"
-        )
-        return Judgement(name, False, f"the policy ends elsewhere than the package's: {hints}")
-    hints = (
-        "does torch.randperm shuffle, once a pass, and nothing else? is the target the second of the two that "
-        "`advantages` returns, the loss its mean squared error?"
-    )
-    return Judgement(
-        name, False, f"the policy is right; the critic ends elsewhere than the package's: {hints}"
-    )
+    right = "its weights are the package's, of the policy and of the critic"
+    return Judgement(name, False, complaint) if complaint else Judgement(name, True, right)
