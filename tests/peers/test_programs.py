@@ -3,28 +3,41 @@
 The programs are assembled from the chapters' cells, and know nothing of the package. What is adapted is what the
 programs fix and the peers fix otherwise:
 
-* a Gaussian with σ of the state: the peer's is free, so the program's network gets a head whose log σ is a parameter;
+* a Gaussian with σ of the state: the peer's σ is free, so the policy's network ends in a log σ that is a parameter;
 * rows are shuffled by `torch.randperm`: it is made to draw as the peer does, from NumPy's global generator;
 * TRPO's sum over action dimensions, and the peer's mean over them, as in `test_trpo_step.py`.
 """
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
 from torch import nn
 
 from inbounds.book.pages import programs
-from inbounds.learning import ActorCritic, Rollout
+from inbounds.learning import ActorCritic, TrainConfig
 from tests.book import by_hand
-from tests.peers.peer import hand_over, largest_difference, our_side, our_weights, shuffler, their_side
-from tests.peers.test_ppo_update import config as ppo_config  # noqa: F401  (a fixture)
-from tests.peers.test_trpo_step import ACT_DIM, make_config, no_noise  # noqa: F401  (a fixture)
+from tests.book.test_program_in_sixty_lines import as_rollout
+from tests.peers import test_ppo_update, test_trpo_step
+from tests.peers.peer import (
+    ENV,
+    hand_over,
+    largest_difference,
+    our_side,
+    our_weights,
+    shuffler,
+    their_side,
+)
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
-SEED = 0
+SEED, ONLY = 1, 0  # of the run, and its place among the runs in lockstep
+LENGTH = 25  # steps until truncation: some episodes end with a fall before, some do not
+config = test_ppo_update.config
+no_noise = test_trpo_step.no_noise
 
 
 class FreeScale(nn.Module):
@@ -52,27 +65,114 @@ def stacked(weights: dict[str, torch.Tensor], trunk: str, head: str) -> nn.Seque
     return nn.Sequential(*layers[:-1])
 
 
-def the_program(name: str, networks: ActorCritic) -> tuple[dict[str, Any], Any, nn.Sequential]:
-    """A chapter's program, its Gaussian policy and its critic, with the weights that the peer is given."""
-    program, weights = by_hand.run(programs.assemble(NOTEBOOKS / f"{name}.ipynb")), our_weights(networks, SEED)
-    policy = object.__new__(program["Policy"])
-    policy.law, policy.squeeze = program["POLICIES"]["gaussian"]
-    policy.net = FreeScale(weights)
-    return program, policy, nn.Sequential(stacked(weights, "value", "value_net"), nn.Flatten(0))
+def started(name: str, config: TrainConfig) -> tuple[dict[str, Any], Any, nn.Sequential, Any, ActorCritic]:
+    """A chapter's program, its Gaussian policy, its critic and its batch, and the package's networks alike."""
+    networks = our_side(dataclasses.replace(config, seeds=(SEED,)))[0].networks
+    for net in networks.networks:  # the program collects in float32: no weight is to be rounded there
+        net.theta.data.copy_(net.theta.data.float().double())
+    program, weights = (
+        by_hand.run(programs.assemble(NOTEBOOKS / f"{name}.ipynb")),
+        our_weights(networks, ONLY),
+    )
+    env = gym.make(ENV, max_episode_steps=LENGTH)
+    policy = program["Policy"](
+        env.observation_space.shape[0], env.action_space, *program["POLICIES"]["gaussian"]
+    )
+    policy.net = FreeScale(weights).float()
+    torch.manual_seed(SEED)
+    _, batch = program["collect"](env, env.reset(seed=SEED)[0], policy, config.algorithm.horizon)
+    env.close()
+    assert batch.terminated.any()
+    assert batch.truncated.any()
+    policy.net.double()
+    critic = nn.Sequential(stacked(weights, "value", "value_net"), nn.Flatten(0))
+    return program, policy, critic, program["Batch"](*(column.double() for column in batch)), networks
 
 
-def the_batch(program: dict[str, Any], rollout: Rollout) -> Any:
-    """The rollout as the program keeps one; next_obs of an end are never looked at, and those of a cut are worth V."""
-    obs = rollout.obs[SEED]
-    columns = rollout.latent, rollout.reward, rollout.terminated, rollout.truncated
-    return program["Batch"](obs, *(column[SEED].double() for column in columns), obs.roll(-1, 0))
+def updated(
+    parts: tuple[dict[str, Any], Any, nn.Sequential, Any, ActorCritic],
+    config: TrainConfig,
+    orders: np.random.RandomState,
+    monkeypatch: pytest.MonkeyPatch,
+    **numbers: float,
+) -> dict[str, torch.Tensor]:
+    """The weights after the program's update, under the peer's names."""
+    program, policy, critic, batch, _ = parts
+    monkeypatch.setattr(torch, "randperm", lambda length: torch.from_numpy(orders.permutation(length)))
+    weights, algorithm = [*policy.net.parameters(), *critic.parameters()], config.algorithm
+    adam = torch.optim.Adam(weights, algorithm.learning_rate, eps=algorithm.adam_eps)
+    passes, size = algorithm.num_epochs, algorithm.minibatch_size
+    program["update"](policy, critic, adam, batch, passes=passes, size=size, **numbers)
+    return weights_of(policy, critic)
 
 
 def weights_of(policy: Any, critic: nn.Sequential) -> dict[str, torch.Tensor]:
     """The program's weights under the peer's names."""
     found = {"log_std": policy.net.log_std.detach()}
-    for layers, trunk, head in ((policy.net.layers, "policy", "action_net"), (critic[0], "value", "value_net")):
+    for layers, trunk, head in (
+        (policy.net.layers, "policy", "action_net"),
+        (critic[0], "value", "value_net"),
+    ):
         names = (f"mlp_extractor.{trunk}_net.0", f"mlp_extractor.{trunk}_net.2", head)
         for name, layer in zip(names, layers[::2], strict=True):
             found[f"{name}.weight"], found[f"{name}.bias"] = layer.weight.detach(), layer.bias.detach()
     return found
+
+
+def furthest(ours: dict[str, torch.Tensor], before: dict[str, torch.Tensor]) -> float:
+    """The largest change of a weight."""
+    return max((ours[name] - before[name]).abs().max().item() for name in ours)
+
+
+def test_ppo_s_update_is_the_peer_s(config: TrainConfig, monkeypatch: pytest.MonkeyPatch) -> None:
+    from stable_baselines3 import PPO
+
+    parts, algorithm = started("ppo", config), config.algorithm
+    assert (algorithm.gamma, algorithm.gae_lambda, algorithm.max_grad_norm) == (0.99, 0.95, 0.5)
+    peer = their_side(
+        PPO,
+        config,
+        n_epochs=algorithm.num_epochs,
+        clip_range=algorithm.clip_range,
+        ent_coef=algorithm.entropy_coef,
+        vf_coef=algorithm.value_coef,
+        max_grad_norm=algorithm.max_grad_norm,
+    )
+    before = our_weights(parts[4], ONLY)
+    hand_over(peer, parts[4], as_rollout(parts[4], parts[3]), ONLY)
+    np.random.set_state(shuffler(SEED).get_state())  # noqa: NPY002
+    peer.train()
+    numbers = {key: getattr(algorithm, key) for key in ("clip_range", "entropy_coef", "value_coef")}
+    after = updated(parts, config, shuffler(SEED), monkeypatch, **numbers)
+    assert furthest(after, before) > 0.02
+    assert largest_difference(after, peer) < 1e-9
+
+
+@pytest.mark.usefixtures("no_noise")
+def test_trpo_s_update_is_the_peer_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Policy step and value regression; the peer clips no gradient, so the program's step is told not to."""
+    from sb3_contrib import TRPO
+
+    config = test_trpo_step.make_config(backtrack_coef=0.5)
+    parts, algorithm = started("trpo", config), config.algorithm
+    parts[0]["step"].__defaults__ = (float("inf"),)
+    assert (algorithm.cg_iters, algorithm.max_backtracks, algorithm.damping) == (10, 10, 0.1)
+    peer = their_side(
+        TRPO,
+        config,
+        n_critic_updates=algorithm.num_epochs,
+        target_kl=algorithm.max_kl / test_trpo_step.ACT_DIM,
+        cg_damping=algorithm.damping / test_trpo_step.ACT_DIM,
+        cg_max_steps=algorithm.cg_iters,
+        line_search_shrinking_factor=algorithm.backtrack_coef,
+        line_search_max_iter=algorithm.max_backtracks,
+    )
+    before = our_weights(parts[4], ONLY)
+    hand_over(peer, parts[4], as_rollout(parts[4], parts[3]), ONLY)
+    orders = shuffler(SEED)
+    np.random.set_state(orders.get_state())  # noqa: NPY002
+    peer.train()
+    orders.permutation(algorithm.horizon)  # the peer shuffles the whole batch, too, before the policy's step
+    after = updated(parts, config, orders, monkeypatch, max_kl=algorithm.max_kl)
+    assert furthest(after, before) > 0.02
+    assert largest_difference(after, peer) < 1e-9
