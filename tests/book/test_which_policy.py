@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.book.anatomy import prose_of
+from inbounds.book.pages.counts import plain
+from tests.book.anatomy import cells_of, prose_of
 
 PAGE = prose_of(Path(__file__).resolve().parents[2] / "notebooks" / "which_policy.ipynb")
 PROGRAMS = dict(re.findall(r"\{tab-item\} (\S+)\n~~~python\n(.*?)^~~~$", PAGE, re.M | re.S))
@@ -41,6 +42,21 @@ assert "latent" in batch.keys()
 assert loss.actor_network is not None
 """,
 }
+
+
+def test_it_is_read_in_two_minutes() -> None:
+    """At the book's 150 words a minute, glued texts written out; without the fold and the programs, which are used."""
+    path = Path(__file__).resolve().parents[2] / "notebooks" / "which_policy.ipynb"
+    shown = {
+        output.metadata.scrapbook.name: "".join(output.data.values()).strip("'")
+        for cell in cells_of(path)
+        for output in cell.get("outputs", [])
+        if "scrapbook" in output.metadata
+    }
+    page = re.sub(r"^(`{4,})\{(?:dropdown|tab-set)\}.*?^\1$", "", PAGE, flags=re.M | re.S)
+    page = re.sub(r"\{glue:text\}`([^`]+)`", lambda found: shown.get(found[1], "number"), page)
+    words = re.findall(r"\w[\w’'.,%/+-]*", plain(page))
+    assert 150 < len(words) <= 300
 
 
 def test_each_library_has_a_program() -> None:

@@ -73,6 +73,16 @@ def counted(rows: Sequence[Evidence]) -> str:
     return f"above on {counts[1]} of {robots}, below on {counts[-1]}, no difference found on {counts[0]}"
 
 
+def short(rows: Sequence[Evidence]) -> str:
+    """Return `counted` without the robots on which no difference is found.
+
+    Example:
+        >>> short([])
+        'not run yet'
+    """
+    return counted(rows).partition(", no difference")[0]
+
+
 def graded(rows: Sequence[Evidence]) -> str:
     """Return how well the differences are founded that leave out 0; the best grade first.
 
