@@ -10,7 +10,7 @@ stands there, as the book has it. The book's download button hands out the same 
 With the chapters go the build notebooks of `tools/build`: blanks for functions of the growing program, each with a
 grader right after it, and the program around them.
 
-A copy that a student has changed is never overwritten.
+A copy that a student has changed is never overwritten. Its first cell says what to install, and checks.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from pathlib import Path
 import nbformat
 
 from inbounds.book.pages.contents import contents
+from inbounds.cli.classroom.ready import INSTALL
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER = ".handed-out.json"
@@ -58,9 +59,21 @@ def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
             cell.source = with_numbers(left, values)
         if cell.source.strip():
             student.cells.append(cell)
+    if student.cells:
+        student.cells.insert(0, ready_cell())
     if inside:
         raise ValueError("a solution does not end: {solution-end} is missing")
     return student
+
+
+def ready_cell() -> nbformat.NotebookNode:
+    """Return the first cell of every copy: what to install, in a line, and whether it is there."""
+    cell = nbformat.v4.new_code_cell(
+        f"# To install, once, in the folder of the book: {INSTALL}\n"
+        "from inbounds.cli.classroom.ready import ready\n\nready()"
+    )
+    cell.id = "ready"  # the same in every copy, so that a copy that nobody changed is known
+    return cell
 
 
 def without_solutions(text: str, inside: bool) -> tuple[str, bool]:

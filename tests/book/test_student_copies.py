@@ -12,6 +12,8 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
+from inbounds.cli.classroom import ready
+
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
@@ -49,7 +51,9 @@ def test_a_chapters_copy_has_no_solution_and_lacks_nothing_else(path: Path) -> N
     code = [cell for cell in student.cells if cell.cell_type == "code"]
     assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
     sources = {cell.id: cell.source for cell in chapter.cells}
-    assert all(cell.source == sources[cell.id] for cell in code)
+    assert code[0] is student.cells[0]
+    assert code[0].id == "ready" not in sources
+    assert all(cell.source == sources[cell.id] for cell in code[1:])
     left_out = [cell for cell in chapter.cells if cell.id not in {kept.id for kept in student.cells}]
     assert all(tagged(cell) or between_markers(chapter, cell) for cell in left_out)
     assert not any(tagged(cell) for cell in student.cells)
@@ -133,6 +137,14 @@ def last_output(notebook: nbformat.NotebookNode) -> str:
 
 
 @pytest.mark.slow
+def test_a_copy_runs_in_any_folder(tmp_path: Path) -> None:
+    student = tool.student_copy(exercise())
+    NotebookClient(student, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    assert student.cells[0].source.splitlines()[0].endswith(ready.INSTALL)
+    assert student.cells[0].outputs[0].text.startswith("Ready: Python 3.")
+
+
+@pytest.mark.slow
 def test_run_all_grades_the_students_own_code() -> None:
     student = tool.student_copy(exercise())
     text = "\n".join(cell.source for cell in student.cells)
@@ -140,7 +152,7 @@ def test_run_all_grades_the_students_own_code() -> None:
     assert "Before." in text
     assert "After." in text
     assert last_output(copy.deepcopy(student)).startswith("… not answered")
-    student.cells[1].source = "def mass_outside(loc, scale, low, high):\n    return 2.0"
+    student.cells[2].source = "def mass_outside(loc, scale, low, high):\n    return 2.0"
     assert last_output(student).startswith("✗ not yet: mass_outside")
 
 
