@@ -42,7 +42,15 @@ CODE = (
     "constraints.txt",
     "pyproject.toml",
 )
-PAGES = ("book", "notebooks", "tools/build_book.py", "tools/student_copies.py", "_config.yml", "_toc.yml")
+PAGES = (
+    "book",
+    "notebooks",
+    "tools/build_book.py",
+    "tools/student_copies.py",
+    "CITATION.cff",
+    "_config.yml",
+    "_toc.yml",
+)
 
 
 def digest(*names: str) -> str:

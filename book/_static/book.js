@@ -63,6 +63,34 @@
   });
   addEventListener("afterprint", () => { for (const fold of opened) fold.open = false; });
 
+  /* Films that play by themselves: on one clock, while they are seen, until the reader stops one, and never for who wants less motion. */
+  const still = matchMedia("(prefers-reduced-motion: reduce)");
+  for (const row of document.querySelectorAll(".inbounds-loop")) {
+    const films = [...row.querySelectorAll("video")];
+    let wanted = !still.matches, seen = false;
+    const start = () => {
+      if (wanted && seen) for (const film of films) { film.muted = true; film.play().catch(() => {}); }
+    };
+    const stop = () => films.forEach((film) => film.pause());
+    for (const film of films) {
+      film.addEventListener("ended", () => {
+        if (!wanted || !films.every((each) => each.ended)) return;
+        for (const each of films) each.currentTime = 0;
+        start();
+      });
+      film.addEventListener("pause", () => {
+        if (film.ended || !seen || document.hidden) return;
+        wanted = false;
+        stop();
+      });
+    }
+    still.addEventListener("change", () => { wanted = !still.matches; if (wanted) start(); else stop(); });
+    new IntersectionObserver(([{ isIntersecting }]) => {
+      seen = isIntersecting;
+      if (seen) start(); else stop();
+    }).observe(row);
+  }
+
   addEventListener("load", async () => {
     await window.MathJax?.startup?.promise;
     allowBreaks();

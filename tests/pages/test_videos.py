@@ -29,6 +29,7 @@ def test_some_page_has_a_video() -> None:
 @pytest.mark.parametrize("name", PAGES)
 def test_videos_play(context: BrowserContext, address: str, name: str) -> None:
     page = context.new_page()
+    page.emulate_media(reduced_motion="reduce")  # else those of the front page begin by themselves
     page.goto(address + name)
     for video in page.locator("video").all():
         assert video.evaluate("node => node.paused && node.currentTime === 0"), "it started by itself"
@@ -43,6 +44,7 @@ def test_videos_play(context: BrowserContext, address: str, name: str) -> None:
 @pytest.mark.parametrize("name", PAGES)
 def test_videos_stop_at_their_end(context: BrowserContext, address: str, name: str) -> None:
     page = context.new_page()
+    page.emulate_media(reduced_motion="reduce")
     page.goto(address + name)
     video = page.locator("video").first
     video.evaluate("node => { node.muted = true; node.playbackRate = 8; return node.play(); }")

@@ -73,12 +73,14 @@ class VideoRow:
 
     Attributes:
         videos: the encoded videos, in order.
+        loop: whether they play by themselves, over and over, where the reader has not asked for less motion.
 
     Made by `show_films`, which has an example.
     """
 
-    def __init__(self, videos: list[Video]) -> None:
+    def __init__(self, videos: list[Video], *, loop: bool = False) -> None:
         self.videos = videos
+        self.loop = loop
 
     def __iter__(self) -> Iterator[Video]:
         return iter(self.videos)
@@ -88,10 +90,10 @@ class VideoRow:
         return f"<{count}: {', '.join(repr(video.title) for video in self.videos)}>"
 
     def _repr_html_(self) -> str:
-        return str(macros("videos").row([video.to_html() for video in self.videos]))
+        return str(macros("videos").row([video.to_html() for video in self.videos], self.loop))
 
 
-def show_films(films: Mapping[str, Film]) -> VideoRow:
+def show_films(films: Mapping[str, Film], *, loop: bool = False) -> VideoRow:
     """Encode films for a page, side by side under their captions.
 
     Before they are played, all show the same moment: the one in which the two films that are most alike differ most.
@@ -99,6 +101,7 @@ def show_films(films: Mapping[str, Film]) -> VideoRow:
 
     Args:
         films: caption → film, each of at most five seconds and of even width and height.
+        loop: in the book, let them play by themselves, on one clock, over and over (`book.js` does it).
 
     Returns:
         An object that a notebook shows as videos, and whose text form names them.
@@ -116,7 +119,7 @@ def show_films(films: Mapping[str, Film]) -> VideoRow:
     if not films:
         raise ValueError("there is no film to show: pass a mapping from captions to films")
     moment = most_telling(list(films.values()))
-    return VideoRow([_encode_for_page(title, film, moment) for title, film in films.items()])
+    return VideoRow([_encode_for_page(title, film, moment) for title, film in films.items()], loop=loop)
 
 
 def most_telling(films: Sequence[Film]) -> float:

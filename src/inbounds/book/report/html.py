@@ -144,5 +144,21 @@ def table(
     return str(_HTML.table(caption, head, rows, words))
 
 
+def links(caption: str, columns: Sequence[str], fields: Mapping[str, Mapping[str, str]], target: str) -> str:
+    """Return a table whose fields are links.
+
+    Args:
+        caption: what it shows.
+        columns: their names, the keys of every row.
+        fields: row → column → text.
+        target: address that every field leads to.
+
+    Example:
+        >>> '<a href="b.html">x &lt; y</a>' in links("A table.", ["ppo"], {"Ant": {"ppo": "x < y"}}, "b.html")
+        True
+    """
+    return str(_HTML.links(caption, columns, fields, target))
+
+
 NONE_FINISHED = missing("missing: none of these cells is finished.")
 """What stands in place of cells of which none is finished."""

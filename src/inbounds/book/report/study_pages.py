@@ -87,20 +87,25 @@ def films(outcomes: Outcomes, robot: str, algorithm: str = "ppo", seconds: float
     return Shown(f"films: {robot}, {algorithm.upper()}, one per family", parts, kind=KIND)
 
 
-def films_of(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float = 4.0) -> Shown:
+def films_of(
+    outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float = 4.0, *, loop: bool = False
+) -> Shown:
     """Return films of chosen cells' final policies, as `films` shows those of one robot.
 
     Args:
         outcomes: where the cells were found.
         chosen: caption → cell; each must keep its policies.
         seconds: of each film.
+        loop: in the book, let them play by themselves, over and over.
     """
-    return Shown(f"films: {', '.join(chosen)}", _side_by_side(outcomes, chosen, seconds), kind=KIND)
+    return Shown(f"films: {', '.join(chosen)}", _side_by_side(outcomes, chosen, seconds, loop), kind=KIND)
 
 
-def _side_by_side(outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float) -> list[str]:
+def _side_by_side(
+    outcomes: Outcomes, chosen: Mapping[str, Outcome], seconds: float, loop: bool = False
+) -> list[str]:
     shown = {_caption(name, o): _film(outcomes, o, seconds) for name, o in chosen.items()}
-    return [show_films(shown)._repr_html_()] if shown else []
+    return [show_films(shown, loop=loop)._repr_html_()] if shown else []
 
 
 def middle_seed(outcome: Outcome) -> int:

@@ -1,0 +1,84 @@
+"""The front page moves, says who wins and where that is shown, and leads four kinds of readers on."""
+
+import pytest
+from playwright.sync_api import BrowserContext, Page
+
+FRONT = "notebooks/front_page.html"
+FILMS = "[...document.querySelectorAll('.inbounds-loop video')]"
+PLAYING = f"{FILMS}.length === 2 && {FILMS}.every((film) => !film.paused && film.currentTime > 0.1)"
+PAUSED = f"{FILMS}.every((film) => film.paused)"
+CARDS = {
+    "I want to learn": "notebooks/actions_have_bounds.html",
+    "I want to use it": "notebooks/which_policy.html",
+    "I teach": "book/preface.html",
+    "I doubt it": "notebooks/claim_by_claim.html",
+}
+
+
+@pytest.fixture
+def front(context: BrowserContext, address: str) -> Page:
+    """The front page, its films in view."""
+    page = context.new_page()
+    page.goto(address + FRONT)
+    page.locator(".inbounds-loop").scroll_into_view_if_needed()
+    return page
+
+
+def test_films_loop_on_one_clock(front: Page) -> None:
+    front.wait_for_function(PLAYING)
+    times = front.evaluate(f"{FILMS}.map((film) => film.currentTime)")
+    assert abs(times[0] - times[1]) < 0.2
+    front.evaluate(f"{FILMS}.forEach((film) => {{ film.currentTime = film.duration - 0.3; }})")
+    front.wait_for_function(f"{FILMS}.every((film) => film.currentTime < 1 && !film.paused)")
+
+
+def test_one_pause_stops_both_for_good(front: Page) -> None:
+    front.wait_for_function(PLAYING)
+    front.evaluate(f"{FILMS}[0].pause()")
+    front.wait_for_function(PAUSED)
+    front.mouse.wheel(0, 5000)
+    front.wait_for_timeout(300)
+    front.mouse.wheel(0, -5000)
+    front.wait_for_timeout(300)
+    assert front.evaluate(PAUSED)
+
+
+def test_out_of_sight_they_rest(front: Page) -> None:
+    front.set_viewport_size({"width": 1280, "height": 300})
+    front.locator(".inbounds-loop").scroll_into_view_if_needed()
+    front.wait_for_function(PLAYING)
+    front.locator("footer").first.scroll_into_view_if_needed()
+    front.wait_for_function(PAUSED)
+    front.locator(".inbounds-loop").scroll_into_view_if_needed()
+    front.wait_for_function(PLAYING)
+
+
+def test_who_wants_less_motion_sees_them_still(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.emulate_media(reduced_motion="reduce")
+    page.goto(address + FRONT)
+    page.locator(".inbounds-loop").scroll_into_view_if_needed()
+    page.wait_for_timeout(1000)
+    assert page.evaluate(f"{PAUSED} && {FILMS}.every((film) => film.currentTime === 0 && film.controls)")
+
+
+def test_every_field_says_who_wins_and_leads_to_its_evidence(front: Page) -> None:
+    fields = front.locator("table.winners tbody td")
+    assert fields.count() == 6 * 2
+    assert fields.locator("a").count() == fields.count()
+    for text in fields.all_inner_texts():
+        assert any(word in text for word in ("above", "below", "no difference found", "not run")), text
+
+
+def test_four_cards_lead_on(front: Page, address: str) -> None:
+    cards = front.locator(".sd-card")
+    assert cards.count() == len(CARDS)
+    for title, target in CARDS.items():
+        link = cards.filter(has_text=title).locator("a")
+        assert link.evaluate("node => node.href") == address + target
+
+
+def test_it_says_how_to_cite(front: Page) -> None:
+    entry = front.locator("#how-to-cite .highlight").inner_text()
+    assert entry.startswith("@software{")
+    assert "In Bounds" in entry
