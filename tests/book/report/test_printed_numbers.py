@@ -1,0 +1,263 @@
+"""What *What happened* and *Which policy?* print, beside the independent analysis of `results/`, final return and area.
+
+The pages' own hidden cells are run, and what they glue is caught. The other side takes nothing from `inbounds`: it
+reads the cells' files by their names, and its statistics are those that hold the second study's analysis
+(`tests/study/second/independent.py`). Where an interval's end or a p-value is so near its limit that the resampling
+decides the word, the word is not compared, and such rows are few.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tests.study.second import independent
+from tests.study.second.independent_statistics import (
+    bootstrap_difference,
+    expanded_share,
+    holm,
+    permutation_p,
+)
+
+ROOT = Path(__file__).resolve().parents[3]
+CELLS = ROOT / "results" / "cells"
+DRAWS = 40_000
+ENDPOINTS, ROBOTS = independent.ENDPOINTS, independent.ROBOTS
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A difference of two means, by other means than the package's."""
+
+    value: float
+    low: float
+    high: float
+    p: float
+    error: float
+    """Of an interval's end, from the resampling on both sides: a share of its width."""
+
+    @property
+    def near(self) -> bool:
+        """Whether the resampling, or the pages' hundredth of a width, decides if the interval holds 0."""
+        return min(abs(self.low), abs(self.high)) < (self.high - self.low) * 0.035
+
+    @property
+    def side(self) -> int:
+        return int(self.low > 0) - int(self.high < 0)
+
+
+@cache
+def seeds_of(name: str) -> independent.Runs:
+    about = json.loads(pq.read_schema(CELLS / f"{name}.parquet").metadata[b"inbounds"])
+    return independent._runs(CELLS / f"{name}.parquet", about["config"])
+
+
+def there(*names: str) -> list[str]:
+    return [name for name in names if (CELLS / f"{name}.parquet").is_file()]
+
+
+@cache
+def gap(first: tuple[str, ...], second: tuple[str, ...], endpoint: str) -> Gap:
+    """First minus second, the seeds of each side's cells together."""
+    x, y = (np.concatenate([seeds_of(name).endpoint(endpoint) for name in side]) for side in (first, second))
+    rng = np.random.default_rng([len(x), *endpoint.encode(), *"".join(first).encode()])
+    share = expanded_share(x, y)
+    low, high = np.quantile(bootstrap_difference(x, y, rng, DRAWS), [share, 1 - share])
+    return Gap(x.mean() - y.mean(), low, high, permutation_p(x, y, rng, 9999), (high - low) * 0.03)
+
+
+@cache
+def printed(page: str) -> dict[str, Any]:
+    """Run a page's hidden cells up to the first that shows something; return its names, and what it glues."""
+    glued: dict[str, Any] = {}
+    names: dict[str, Any] = {}
+    for cell in nbformat.read(ROOT / "notebooks" / f"{page}.ipynb", as_version=4).cells:
+        hidden = {"remove-cell", "hide-input"} & set(cell.metadata.get("tags", []))
+        if (
+            cell.cell_type != "code"
+            or not hidden
+            or re.match(r"study_pages|answers|as_they_come", cell.source)
+        ):
+            continue
+        exec(compile(cell.source, page, "exec"), names)
+        names["glue"] = lambda name, value, display: glued.update({name: value})
+        if "second-done" in glued:  # the last that both of them glue before the first view
+            break
+    return names | {"glued": glued}
+
+
+def law_cells(algorithm: str, law: str, robot: str) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+    """The files behind a law and its equally quiet Gaussian: the second study's if both are there, else the first's."""
+    low = robot.lower()
+    pair = [
+        there(*(f"{arm}-{low}-{algorithm}-{family}" for arm in ("equal", "equal-more")))
+        for family in (law, "gaussian-free-std")
+    ]
+    if all(pair):
+        return tuple(pair[0]), tuple(pair[1])
+    quiet = {
+        family: there(
+            *(f"{arm}-{low}-{algorithm}-{family}-matched-noise" for arm in ("mechanisms", "afterwards"))
+        )
+        for family in (law, "gaussian")
+    }
+    bounded = quiet[law] or there(*(f"{arm}-{low}-{algorithm}-{law}" for arm in ("standard", "beyond")))
+    return ((bounded[0],), (quiet["gaussian"][0],)) if bounded and quiet["gaussian"] else None
+
+
+def same(row: Any, mine: Gap) -> None:
+    """A bar of a forest: value to rounding, ends to what resampling leaves open."""
+    assert float(row.difference.value) == pytest.approx(mine.value, rel=1e-9, abs=1e-9)
+    assert float(row.difference.low) == pytest.approx(mine.low, abs=mine.error)
+    assert float(row.difference.high) == pytest.approx(mine.high, abs=mine.error)
+
+
+def law_rows() -> Iterator[tuple[str, str, str, str, Gap]]:
+    for algorithm in ("ppo", "trpo"):
+        for law in ("beta", "logit-normal"):
+            for endpoint in ENDPOINTS:
+                for robot in ROBOTS:
+                    if files := law_cells(algorithm, law, robot):
+                        yield algorithm, law, endpoint, robot, gap(*files, endpoint)
+
+
+@pytest.mark.parametrize("page", ["which_policy", "what_happened"])
+def test_from_an_equal_start(page: str) -> None:
+    """Every bar of the forests; and on how many robots a law is above and below, in the page's words."""
+    names = printed(page)
+    rows = {(r.algorithm, r.law, r.endpoint, r.robot): r for r in names["rows"]}
+    mine = {key[:4]: key[4] for key in law_rows()}
+    assert set(rows) == set(mine)
+    for key, row in rows.items():
+        same(row, mine[key])
+    assert sum(each.near for each in mine.values()) <= len(mine) / 6
+    compared = 0
+    for algorithm, law, endpoint in dict.fromkeys(key[:3] for key in mine):
+        here = {key[3]: found for key, found in mine.items() if key[:3] == (algorithm, law, endpoint)}
+        text = names["glued"][f"{law}-{algorithm}-{endpoint}"]
+        above, of, below, none = map(int, re.findall(r"\d+", text))
+        assert above + below + none == of == len(here)
+        for said, side in ((above, 1), (below, -1)):
+            sure = sum(found.side == side and not found.near for found in here.values())
+            assert sure <= said <= sure + sum(found.near for found in here.values()), (text, here)
+        compared += of
+    assert compared == len(mine)
+
+
+@pytest.mark.parametrize(("page", "suffix"), [("which_policy", "-leads"), ("what_happened", "-{}-leads")])
+def test_the_differences_that_are_named(page: str, suffix: str) -> None:
+    """Robot, value and interval of each difference that leaves out 0, as printed."""
+    names, mine, seen = printed(page), {key[:4]: key[4] for key in law_rows()}, 0
+    for algorithm, law, endpoint in dict.fromkeys(key[:3] for key in mine):
+        name = f"{law}-{algorithm}{suffix.format(endpoint)}"
+        if name not in names["glued"] or (page == "which_policy" and endpoint == "area"):
+            continue
+        told = re.findall(r"(\w+) ([−\d.]+) \[([−\d.]+), ([−\d.]+)\] \((.+?)\)", names["glued"][name])
+        assert {each[0] for each in told} >= {
+            key[3]
+            for key, found in mine.items()
+            if key[:3] == (algorithm, law, endpoint) and found.side and not found.near
+        }
+        for robot, *numbers, _ in told:
+            value, low, high = (float(number.replace("−", "-")) for number in numbers)
+            found = mine[algorithm, law, endpoint, robot]
+            digit = 0.51 if abs(value) >= 100 else 0.051
+            assert value == pytest.approx(found.value, abs=digit)
+            assert (low, high) == pytest.approx((found.low, found.high), abs=found.error + digit)
+            seen += 1
+    assert seen
+
+
+def test_a_quiet_start() -> None:
+    """A quiet Gaussian minus one as it comes, all bars and the count on the answer page."""
+    names = printed("which_policy")
+    counts: dict[str, list[Gap]] = {}
+    for row in names["starts"]:
+        low = row.robot.lower()
+        quiet = there(
+            *(f"{arm}-{low}-{row.algorithm}-gaussian-matched-noise" for arm in ("mechanisms", "afterwards"))
+        )
+        mine = gap((quiet[0],), (f"standard-{low}-{row.algorithm}-gaussian",), row.endpoint)
+        same(row, mine)
+        if row.endpoint == "final":
+            counts.setdefault(row.algorithm, []).append(mine)
+    for algorithm, found in counts.items():
+        above, of, below = map(int, re.findall(r"\d+", names["glued"][f"quiet-{algorithm}"]))
+        near = sum(each.near for each in found)
+        assert of == len(found)
+        assert abs(above - sum(each.side > 0 for each in found)) <= near
+        assert abs(below - sum(each.side < 0 for each in found)) <= near
+
+
+CONTRASTS = (
+    ("ppo", "logit-normal", "gaussian"),
+    ("ppo", "beta", "gaussian"),
+    ("ppo", "logit-normal", "beta"),
+    ("trpo", "logit-normal", "gaussian"),
+)
+
+
+@pytest.mark.parametrize("endpoint", ENDPOINTS)
+@pytest.mark.parametrize(("arm", "short"), [("standard", "come"), ("printed", "printed")])
+def test_as_they_come_and_as_printed(arm: str, short: str, endpoint: str) -> None:
+    """Bars; robots above and below after Holm over six; a dagger where Holm over all of the arm would not find it."""
+    names = printed("what_happened")
+    rows = {(*row.contrast[1:], row.robot): row for row in names["compared"][arm] if row.endpoint == endpoint}
+    mine: dict[tuple[str, ...], Gap] = {}
+    for algorithm, first, second in CONTRASTS:
+        for robot in ROBOTS:
+            files = there(*(f"{arm}-{robot.lower()}-{algorithm}-{family}" for family in (first, second)))
+            if len(files) == 2:
+                mine[algorithm, first, second, robot] = gap((files[0],), (files[1],), endpoint)
+    assert set(rows) == set(mine)
+    places = [(*contrast, robot) for contrast in CONTRASTS for robot in ROBOTS]
+    p_values = {place: mine[place].p if place in mine else np.nan for place in places}
+    over_all = dict(zip(places, holm(np.array(list(p_values.values()))), strict=True))
+    words = 0
+    for contrast in CONTRASTS:
+        six = holm(np.array([p_values[(*contrast, robot)] for robot in ROBOTS]))
+        here = {r: p for r, p in zip(ROBOTS, six, strict=True) if (*contrast, r) in mine}
+        name = f"{short}-{contrast[0]}-{contrast[1]}" + (
+            "" if contrast[2] == "gaussian" else f"-{contrast[2]}"
+        )
+        text = names["glued"][f"{name}-{endpoint}"]
+        for word, side in (("above", 1), ("below", -1)):
+            listed = re.search(rf"{word} on (\d+)[^(,]*(?:\(([^)]*)\))?", text)
+            assert listed, text
+            told = [robot for robot in (listed[2] or "").split(", ") if robot]
+            assert len(told) == int(listed[1])
+            for robot, p in here.items():
+                found = mine[(*contrast, robot)]
+                same(rows[(*contrast, robot)], found)
+                if found.near or 0.03 < p < 0.08:
+                    continue
+                words += 1
+                assert (robot in [each.rstrip("†") for each in told]) == (found.side == side and p < 0.05), (
+                    text
+                )
+                if robot in told or f"{robot}†" in told:
+                    wide = over_all[(*contrast, robot)]
+                    assert 0.03 < wide < 0.08 or (f"{robot}†" in told) == (wide >= 0.05), (text, wide)
+    assert words >= len(mine)
+
+
+def test_a_wrong_number_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Were the last fifty epochs the last forty, or one seed lost, the bars would not agree."""
+    names = printed("which_policy")
+    row = next(r for r in names["rows"] if (r.robot, r.algorithm, r.endpoint) == ("Ant", "ppo", "final"))
+    first, second = law_cells("ppo", row.law, "Ant") or ((), ())
+    right = gap(first, second, "final")
+    shorter: Callable[..., Any] = lambda self, _: independent.repeated(self.returns)[:, -40:].mean(1)  # noqa: E731
+    monkeypatch.setattr(independent.Runs, "endpoint", shorter)
+    wrong = gap.__wrapped__(first, second, "final")
+    same(row, right)
+    with pytest.raises(AssertionError):
+        same(row, wrong)
