@@ -8,6 +8,7 @@
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
+* The theme that the system asks for is set before anything is drawn.
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
@@ -151,6 +152,11 @@ def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
                 text.parent.replace(text, nodes.Text(as_prose(text.astext())))
 
 
+# "auto" shows the logo of either theme until the theme's script has run, and then the page moves.
+CHOOSE_THEME = """if (document.documentElement.dataset.theme === "auto")
+  document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";"""
+
+
 def is_thebe(script: Any) -> bool:
     """Whether a script tag comes from sphinx-thebe: its file, or its inline settings."""
     attributes = getattr(script, "attributes", {})
@@ -159,6 +165,7 @@ def is_thebe(script: Any) -> bool:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers (called by Sphinx)."""
+    app.add_js_file(None, body=CHOOSE_THEME, priority=1)
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
     app.connect("html-page-context", mend_labels)

@@ -10,6 +10,7 @@
 """
 
 import html
+import itertools
 import re
 from typing import Any
 
@@ -20,6 +21,11 @@ STAYS_OPEN = ("Build it", "Exercises", "Exercise")
 PROGRAM = "tag_program"
 LONGEST_LABEL = 60  # characters of the first line
 LONGEST_CAPTION = 180  # characters of an alt text that is shown whole
+# What `inbounds.book.report.html.figure` writes.
+STUDY_FIGURE = re.compile(
+    r'(?P<picture><figure>\s*<img [^>]*? alt="(?P<alt>[^"]*)">\s*)<figcaption>(?P<caption>.*?)</figcaption>',
+    re.DOTALL,
+)
 FIGURE = "inbounds-figure"  # the class that `inbounds.book.drawing.alt_text` gives a figure
 # Read before anything is drawn: what is folded must not be seen open first.
 CHOOSE = """document.documentElement.dataset.layer = "read";
@@ -100,17 +106,31 @@ def caption(number: int, alt: str) -> str:
     )
 
 
+def study_figure(found: re.Match[str], number: int) -> str:
+    """Return a figure that came as HTML with its number, and its alt text in a fold behind the caption that it has."""
+    alt = found["alt"]  # escaped already
+    return (
+        f'{found["picture"]}<figcaption><span class="number">Figure {number}.</span> {found["caption"]}'
+        f"<details><summary>What it shows</summary><p>{alt}</p></details></figcaption>"
+    )
+
+
 def number_figures(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Give every figure of a page its number and its caption."""
+    """Give every figure of a page its number and its caption, those of the study's tables and forests too."""
     if app.builder.format != "html":
         return
-    figures = [image for image in doctree.findall(nodes.image) if FIGURE in image["classes"]]
-    for number, image in enumerate(figures, 1):
-        place, around = image.parent.index(image), image.parent
-        made = [raw(f'<figure class="{FIGURE}">'), image, raw(caption(number, image["alt"]) + "</figure>")]
-        around.children[place : place + 1] = made
-        for child in made:
-            child.parent = around
+    numbers = itertools.count(1)
+    for node in list(doctree.findall(lambda node: isinstance(node, nodes.image | nodes.raw))):
+        if isinstance(node, nodes.raw):
+            text = STUDY_FIGURE.sub(lambda found: study_figure(found, next(numbers)), node.astext())
+            node.children = [nodes.Text(text)]
+        elif FIGURE in node["classes"]:
+            around, number = node.parent, next(numbers)
+            place = around.index(node)
+            made = [raw(f'<figure class="{FIGURE}">'), node, raw(caption(number, node["alt"]) + "</figure>")]
+            around.children[place : place + 1] = made
+            for child in made:
+                child.parent = around
 
 
 def add_button(

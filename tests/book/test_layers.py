@@ -2,10 +2,12 @@
 
 from types import ModuleType, SimpleNamespace
 
+import matplotlib.pyplot as plt
 import pytest
 from docutils import nodes
 from docutils.utils import new_document
 
+from inbounds.book.report import html as study_html
 from tests.book.test_extension import load
 
 HTML = SimpleNamespace(builder=SimpleNamespace(format="html"))
@@ -77,6 +79,20 @@ def test_figures_are_numbered_and_captioned_in_order(layers: ModuleType) -> None
     assert "training.</span><details>" in captions[1]
     assert captions[1].count("It ends low.") == 12
     assert "&lt;curve&gt;" in captions[1]
+
+
+def test_figures_that_come_as_html_are_counted_with_the_others(layers: ModuleType) -> None:
+    document = new_document("page")
+    shown = study_html.figure(plt.figure(), 'Bars of "both" laws & their intervals.', "All from one study.")
+    document += nodes.raw("", shown + shown, format="html")
+    document += nodes.container(
+        "", nodes.image(uri="a.png", alt="Two bars, of one height.", classes=["inbounds-figure"])
+    )
+    layers.number_figures(HTML, document, "page")
+    text = document.astext()
+    assert [text.count(f'<span class="number">Figure {i}.</span>') for i in (1, 2, 3, 4)] == [1, 1, 1, 0]
+    assert text.count("<p>Bars of &#34;both&#34; laws &amp; their intervals.</p></details></figcaption>") == 2
+    assert text.count("All from one study.") == 2
 
 
 def test_icons_of_pages_styles_and_scripts_are_found(tmp_path) -> None:

@@ -10,7 +10,7 @@ PAUSED = f"{FILMS}.every((film) => film.paused)"
 CARDS = {
     "I want to learn": "notebooks/actions_have_bounds.html",
     "I want to use it": "notebooks/which_policy.html",
-    "I teach": "book/preface.html",
+    "I teach": "book/teaching.html",
     "I doubt it": "notebooks/claim_by_claim.html",
 }
 

@@ -100,7 +100,9 @@ def test_figures_are_numbered_and_say_what_their_alt_text_says(
         """nodes => nodes.map((node) => [node.querySelector('.number').textContent, node.querySelector('img').alt,
           [...node.querySelectorAll('[aria-hidden], details > p')].map((part) => part.textContent).join(' ')])""",
     )
-    assert [number for number, _, _ in told] == [f"Figure {i}." for i in range(1, len(told) + 1)]
+    numbers = page.locator("figure > figcaption > .number").all_text_contents()
+    assert numbers == [f"Figure {i}." for i in range(1, len(numbers) + 1)]
+    assert {number for number, _, _ in told} <= set(numbers)
     assert all(alt == caption for _, alt, caption in told)
 
 
