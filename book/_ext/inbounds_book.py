@@ -7,6 +7,7 @@
   loads one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
+* A full stop behind a DOI stays with it (see ``keep_full_stops``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
 * The theme that the system asks for is set before anything is drawn.
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
@@ -70,6 +71,17 @@ MENDED = {
     ' role="doc-biblioentry"': ' role="listitem"',  # deprecated by ARIA, and no child for the list around it
     ' aria-label="Toggle hidden content"': "",  # on a summary that says "Show code cell source"
 }
+
+
+LONELY = re.compile(r"(?<=doi:)([^<]*)([^<]{4})</a>\.")
+TOGETHER = r'\1<span style="white-space:nowrap">\2.</span></a>'
+
+
+def keep_full_stops(
+    app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Keep the full stop behind a DOI with its last digits: both break anywhere, and it would stand on a line alone."""
+    context["body"] = LONELY.sub(TOGETHER, context.get("body", ""))
 
 
 def mend_labels(
@@ -169,6 +181,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
     app.connect("html-page-context", mend_labels)
+    app.connect("html-page-context", keep_full_stops)
     app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500
     app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("missing-reference", resolve_public_name)

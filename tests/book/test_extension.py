@@ -139,3 +139,14 @@ def test_programs_are_written_beside_the_pages(tmp_path: Path) -> None:
     assert written.name == "with_one.py"
     assert written.read_text().startswith('"""A title: the program')
     assert "\nx = 1\n" in written.read_text()
+
+
+def test_a_full_stop_stays_with_its_doi(extension: ModuleType) -> None:
+    context = {
+        "body": '<a href="https://doi.org/10.1/123456">doi:10.1/123456</a>. <a href="#">elsewhere</a>.'
+    }
+    extension.keep_full_stops(None, "book/bibliography", "", context, None)
+    assert context["body"] == (
+        '<a href="https://doi.org/10.1/123456">doi:10.1/12<span style="white-space:nowrap">3456.</span></a>'
+        ' <a href="#">elsewhere</a>.'
+    )

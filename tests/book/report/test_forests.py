@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from inbounds.book.report.forests import SERIES, Bar, forest, in_words
+from inbounds.book.drawing.figures import NARROW
+from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.study.statistics import Estimate
 
 
@@ -49,6 +50,25 @@ def test_bars_stand_in_their_units() -> None:
     ]
     assert list(bar.get_xdata()) == [-2.0, -1.0]
     assert round(float(np.mean(bar.get_ydata()))) == 0
+
+
+def test_on_a_phone_the_panels_stand_below_each_other_and_fit() -> None:
+    panels = {"final return": BARS["PPO"], "area under the learning curve": BARS["TRPO"]}
+    wide, narrow = (forest(panels, xlabel=MARGINS_AS_UNIT, narrow=n) for n in (False, True))
+    assert narrow.get_size_inches()[0] == NARROW
+    for ax, same in zip(narrow.axes, wide.axes, strict=True):
+        assert [list(line.get_xdata()) for line in ax.lines] == [
+            list(line.get_xdata()) for line in same.lines
+        ]
+    narrow.draw_without_rendering()
+    renderer = narrow.canvas.get_renderer()
+    boxes = [ax.get_tightbbox(renderer) for ax in narrow.axes]
+    boxes += [each.get_window_extent(renderer) for each in (*narrow.legends, *narrow.texts)]
+    for box in boxes:
+        assert box.x0 >= 0
+        assert box.x1 <= narrow.bbox.width
+    upper, lower = (ax.get_window_extent(renderer) for ax in narrow.axes)
+    assert upper.y0 > lower.y1
 
 
 def test_a_hollow_bar_is_hollow() -> None:

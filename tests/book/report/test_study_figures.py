@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, png_bytes
+from inbounds.book.drawing.figures import LOOKS, NARROW, WIDTH, png_bytes
 from inbounds.book.report import study_figures
 from inbounds.book.report.study_figures import Curve
 from inbounds.study import statistics
@@ -169,22 +169,28 @@ def test_profiles_are_drawn_as_given() -> None:
     assert "at each τ by itself" in words(fig)
 
 
+@pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("rows", [1, 2, 5, 6])
 @pytest.mark.parametrize("kind", ["curves", "bars", "differences"])
-def test_nothing_overlaps_or_leaves_the_figure(rows: int, kind: str) -> None:
+def test_nothing_overlaps_or_leaves_the_figure(rows: int, kind: str, narrow: bool) -> None:
     robots = ROBOTS[:rows]
     if kind == "curves":
-        fig = study_figures.learning_curves({r: {f: curve(i) for i, f in enumerate(LOOKS)} for r in robots})
+        fig = study_figures.learning_curves(
+            {r: {f: curve(i) for i, f in enumerate(LOOKS)} for r in robots}, narrow=narrow
+        )
     elif kind == "bars":
         lost = estimate([np.nan, *scores(0)[1:]], missing="exclude")
-        fig = study_figures.interval_panels({r: dict.fromkeys(LOOKS, lost) for r in robots})
+        fig = study_figures.interval_panels({r: dict.fromkeys(LOOKS, lost) for r in robots}, narrow=narrow)
     else:
         lost = statistics.difference(
             [np.nan, *scores(0)[1:]], scores(1), np.random.default_rng(0), missing="exclude"
         )
         row = statistics.Comparison(lost, 0.0001, 0.0006)
         pairs = [("logit-normal", "clipped-gaussian"), ("beta", "gaussian")]
-        fig = study_figures.difference_panels({r: dict.fromkeys(pairs, row) for r in robots})
+        fig = study_figures.difference_panels({r: dict.fromkeys(pairs, row) for r in robots}, narrow=narrow)
+    assert fig.get_size_inches()[0] == (NARROW if narrow else WIDTH)
+    if narrow:
+        assert all(ax.get_subplotspec().get_gridspec().ncols == 1 for ax in fig.axes)
     fig.draw_without_rendering()
     renderer = fig.canvas.get_renderer()
     boxes = [ax.get_tightbbox(renderer) for ax in fig.axes]

@@ -223,6 +223,8 @@ def test_text_is_escaped_and_alt_text_is_asked_for() -> None:
     assert "<td>a &lt; b</td>" in html.table("Caption.", ["x", "y"], [["", "a < b"]])
     with pytest.raises(ValueError, match="too short"):
         html.figure(mpl.figure.Figure(), "A figure")
+    with pytest.raises(ValueError, match="too short"):
+        html.figure_of(lambda narrow: mpl.figure.Figure(), "A figure")
 
 
 def test_a_file_that_cannot_be_written_is_a_clear_line(

@@ -36,8 +36,22 @@ def svg_bytes(fig: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def last_picture(fig: Figure, alt: str) -> tuple[str, int]:
+def _with_few_colors(png: bytes, colors: int) -> bytes:
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    image = Image.open(io.BytesIO(png)).convert("RGB")
+    image.quantize(colors, dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
+
+
+def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
     """Close a figure, and return its PNG in base64 and its width in CSS pixels.
+
+    Args:
+        fig: the figure.
+        alt: what it shows.
+        colors: at most so many in the picture; 0 is as many as it has.
 
     Raises:
         ValueError: the alt text says less than a sentence would.
@@ -48,7 +62,8 @@ def last_picture(fig: Figure, alt: str) -> tuple[str, int]:
         raise ValueError(
             f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
         )
-    png = base64.b64encode(png_bytes(fig)).decode("ascii")
+    drawn = png_bytes(fig)
+    png = base64.b64encode(_with_few_colors(drawn, colors) if colors else drawn).decode("ascii")
     width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
     plt.close(fig)
     return png, width

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
-from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
+from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.many_resamples import of as of
 from inbounds.study.grid import ROBOTS
@@ -141,10 +141,9 @@ def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
     if not here:
         return html.of_study(what, html.NONE_FINISHED)
     alt = f"Quiet minus plain Gaussian with 95 percent intervals. {in_words(panels)}"
-    fig = forest(panels, xlabel=MARGINS_AS_UNIT, order=ROBOTS)
     lacking = [robot for robot in ROBOTS if not of(here, robot=robot)]
     strip = [html.missing(f"Not run: {', '.join(lacking)}.")] if lacking else []
-    return html.of_study(what, html.figure(fig, alt, _caption({algorithm: here})), *strip)
+    return html.of_study(what, html.figure_of(of_robots(panels), alt, _caption({algorithm: here})), *strip)
 
 
 def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
@@ -152,8 +151,7 @@ def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
     if not drawn:
         return html.of_study(what, html.NONE_FINISHED)
     alt = f"Differences with 95 percent intervals, a group of rows per robot. {in_words(drawn)}"
-    fig = forest(drawn, xlabel=MARGINS_AS_UNIT, order=ROBOTS)
-    return html.of_study(what, html.figure(fig, alt, _caption(panels)), *_waiting(panels))
+    return html.of_study(what, html.figure_of(of_robots(drawn), alt, _caption(panels)), *_waiting(panels))
 
 
 def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:

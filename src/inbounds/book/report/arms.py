@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
@@ -82,10 +84,8 @@ def curves(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         band = analysis.curve(outcome) if outcome else None
         return Curve(outcome.steps, band) if outcome and band else None
 
-    fig = learning_curves(
-        {robot: {family: drawn(o) for family, o in row.items()} for robot, row in part.begun.items()},
-        ylabel="return of training episodes",
-    )
+    panels = {robot: {family: drawn(o) for family, o in row.items()} for robot, row in part.begun.items()}
+    draw = partial(_curves_of, panels)
     alt = (
         f"Learning curves ({part.title}), a panel per robot, a line per family. "
         f"Mean final returns: {in_words(_finals(part))}"
@@ -97,7 +97,11 @@ def curves(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     counts = {robot: (sum(map(bool, row.values())), len(row)) for robot, row in part.cells.items()}
     unfinished = any(done < planned for done, planned in counts.values())
     strip = [html.progress(counts)] if unfinished else []
-    return part.shown("learning curves", html.figure(fig, alt, caption), *strip)
+    return part.shown("learning curves", html.figure_of(draw, alt, caption), *strip)
+
+
+def _curves_of(panels: Mapping[str, Mapping[str, Curve | None]], narrow: bool) -> Figure:
+    return learning_curves(panels, ylabel="return of training episodes", narrow=narrow)
 
 
 def _finals(part: Part) -> dict[str, dict[str, Estimate | None]]:
@@ -113,9 +117,11 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     if not part.begun:
         return part.missing("endpoints")
     finals = _finals(part)
-    fig = interval_panels(
-        finals, xlabel="final return: mean of training returns over the last 10 % of epochs"
-    )
+
+    def draw(narrow: bool) -> Figure:
+        label = "final return: mean of training returns over the last 10 % of epochs"
+        return interval_panels(finals, xlabel=label, narrow=narrow)
+
     alt = f"Final returns ({part.title}) with intervals, a panel per robot: {in_words(finals)}"
     head = ["robot", "family", "seeds", "diverged"]
     head += [f"{name}, {statistic}" for name in HEADS.values() for statistic in ("mean", "IQM")]
@@ -132,7 +138,7 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         f"Endpoints ({part.title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval."
         f"{_unfinished(part.begun)}"
     )
-    return part.shown("endpoints", html.figure(fig, alt), html.table(caption, head, rows, words=(0, 1)))
+    return part.shown("endpoints", html.figure_of(draw, alt), html.table(caption, head, rows, words=(0, 1)))
 
 
 def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
@@ -148,13 +154,16 @@ def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     parts = [_tests(part.title, found)]
     if known := _compared(found):
         finals = {robot: {(c.first, c.second): found[c][0][robot] for c in contrasts} for robot in known}
-        fig = difference_panels(finals, xlabel="difference of mean final returns")
+
+        def draw(narrow: bool) -> Figure:
+            return difference_panels(finals, xlabel="difference of mean final returns", narrow=narrow)
+
         alt = f"Differences of mean final returns ({part.title}), a panel per robot: " + ". ".join(
             f"{pair_name(c)} on {robot}: {spoken(found[c][0][robot].difference)}"
             for c in contrasts
             for robot in known
         )
-        parts = [html.figure(fig, alt), *parts]
+        parts = [html.figure_of(draw, alt), *parts]
     gone = sum(int(outcome.diverged.sum()) for _, _, outcome in part.finished())
     if not gone:
         said = html.paragraph("No seed diverged here: without such seeds every number is the same.")

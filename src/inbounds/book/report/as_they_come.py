@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inbounds.book.report import html
-from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
+from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.many_resamples import difference_of
 from inbounds.book.report.many_resamples import of as of
@@ -139,12 +139,13 @@ def comparisons(rows: Sequence[Compared], arm: str, algorithm: str) -> Shown:
         return html.of_study(what, html.NONE_FINISHED)
     panels = {name: [_bar(row) for row in of(here, endpoint=e)] for e, name in ENDPOINTS.items()}
     alt = f"Differences with 95 percent intervals ({title_of(arm, algorithm)}). {in_words(panels)}"
-    fig = forest(panels, xlabel=MARGINS_AS_UNIT, order=ROBOTS)
     caption = (
         "Bars: 95 % bootstrap intervals of a difference of means, ten seeds a side. Filled: found after Holm's "
         "correction over the robots; hollow: not. Grey: too small to choose by, a fifth of what training adds."
     )
-    return html.of_study(what, html.figure(fig, alt, caption), *_missing(arm, algorithm, here))
+    return html.of_study(
+        what, html.figure_of(of_robots(panels), alt, caption), *_missing(arm, algorithm, here)
+    )
 
 
 def _bar(row: Compared) -> Bar:

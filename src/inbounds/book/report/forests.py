@@ -8,14 +8,16 @@ the grey band a difference is too small to choose by.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, SHADES, WIDTH, use_style
+from inbounds.book.drawing.figures import LOOKS, NARROW, SHADES, WIDTH, use_style
+from inbounds.study.grid import ROBOTS
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import spoken
 
@@ -92,15 +94,21 @@ class Bar:
 
 
 def forest(
-    panels: Mapping[str, Sequence[Bar]], *, xlabel: str, band: float = 1.0, order: Sequence[str] = ()
+    panels: Mapping[str, Sequence[Bar]],
+    *,
+    xlabel: str,
+    band: float = 1.0,
+    order: Sequence[str] = (),
+    narrow: bool = False,
 ) -> Figure:
-    """Draw differences with their intervals, side by side in panels that share their groups.
+    """Draw differences with their intervals, in panels that share their groups.
 
     Args:
         panels: title → its bars; a group that one panel has, all show.
         xlabel: what the differences are measured in.
         band: half the width of the grey band around zero; 0 draws none.
         order: of the groups; others follow as they come.
+        narrow: one panel below the other, for a phone, in place of side by side.
 
     Returns:
         The figure, a row a bar, under the names of the groups.
@@ -123,8 +131,10 @@ def forest(
     groups = [group for group in dict.fromkeys((*order, *known)) if group in known]
     kinds = [name for name in SERIES if any(bar.series == name for bar in bars)]
     with use_style():
-        size = (WIDTH, 1.5 + len(groups) * (0.24 + 0.17 * len(kinds)))
-        fig, axes = plt.subplots(1, len(panels), figsize=size, sharey=True, sharex=True, squeeze=False)
+        height = len(groups) * (0.24 + 0.17 * len(kinds))
+        size = (NARROW, 2.0 + len(panels) * (0.4 + height)) if narrow else (WIDTH, 1.5 + height)
+        shape = (len(panels), 1) if narrow else (1, len(panels))
+        fig, axes = plt.subplots(*shape, figsize=size, sharey=True, sharex=True, squeeze=False)
         for ax, (title, found) in zip(axes.flat, panels.items(), strict=True):
             ax.axvspan(-band, band, color=_BAND, alpha=0.6, linewidth=0)
             ax.axvline(0, color=_QUIET, linewidth=1)
@@ -134,18 +144,27 @@ def forest(
                 ax.plot([low, high], [place, place], color=look.color, linewidth=2, linestyle="-")
                 face = "white" if bar.hollow else look.color
                 ax.plot(value, place, look.marker, color=look.color, markerfacecolor=face, markersize=7)
-            ax.set_title(title)
+            ax.set_title(textwrap.fill(title, 22) if narrow else title)
             ax.grid(visible=False, axis="y")
         first = axes[0, 0]
         first.set_yticks(range(len(groups)), groups)
         first.set_ylim(len(groups) - 0.5, -0.5)
-        fig.supxlabel(xlabel)
+        fig.supxlabel(textwrap.fill(xlabel, 32) if narrow else xlabel)
         handles = [
             plt.Line2D([], [], color=s.color, marker=s.marker, linestyle="-", label=s.label)
             for s in (SERIES[name] for name in kinds)
         ]
-        fig.legend(handles=handles, loc="outside upper center", ncols=min(len(kinds), 2))
+        fig.legend(handles=handles, loc="outside upper center", ncols=1 if narrow else min(len(kinds), 2))
     return fig
+
+
+def of_robots(panels: Mapping[str, Sequence[Bar]]) -> Callable[[bool], Figure]:
+    """Return what draws a forest of robots in margins, narrow or wide, as `html.figure_of` wants it.
+
+    Args:
+        panels: title → its bars.
+    """
+    return lambda narrow: forest(panels, xlabel=MARGINS_AS_UNIT, order=ROBOTS, narrow=narrow)
 
 
 def _offset(kinds: Sequence[str], name: str) -> float:

@@ -5,7 +5,7 @@ Texts are plain and are escaped on the way (`templates/report.html`); the parts 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from matplotlib.figure import Figure
@@ -15,6 +15,8 @@ from inbounds.book.templates import macros
 
 KIND = "inbounds-study"
 """Class by which the book's style sheet knows a view of the study."""
+COLORS = 128
+"""Of a figure in two shapes: as many as bands and lines need, and together no more bytes than one with all its colours."""
 _HTML = macros("report")
 
 
@@ -124,6 +126,22 @@ def figure(fig: Figure, alt: str, caption: str = "") -> str:
     """
     png, width = last_picture(fig, alt)
     return str(_HTML.figure(png, width, alt, caption))
+
+
+def figure_of(draw: Callable[[bool], Figure], alt: str, caption: str = "") -> str:
+    """Return a figure that a page of a phone's width shows in another shape: panels below each other.
+
+    Args:
+        draw: draws it, narrow or wide.
+        alt: what both show.
+        caption: below it.
+
+    Raises:
+        ValueError: the alt text says less than a sentence would.
+    """
+    narrow, narrow_width = last_picture(draw(True), alt, colors=COLORS)
+    png, width = last_picture(draw(False), alt, colors=COLORS)
+    return str(_HTML.figure(png, width, alt, caption, narrow, narrow_width))
 
 
 def table(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from inbounds.book.report import html
 from inbounds.book.report.as_they_come import compared
 from inbounds.book.report.equal_start import laws
-from inbounds.book.report.forests import MARGINS_AS_UNIT, Bar, forest, in_words
+from inbounds.book.report.forests import Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.many_resamples import difference_of
 from inbounds.book.report.study_figures import SHORT
@@ -114,7 +114,7 @@ def leads(outcomes: Outcomes) -> Shown:
         "the law being nearly so as it comes. Both loud: the logit-normal executes 0.7, the Gaussian 0.72. Grey: too "
         "small to choose by. A bar that is not there is an experiment that nobody has run."
     )
-    return html.of_study(what, html.figure(forest(panels, xlabel=MARGINS_AS_UNIT), alt, caption))
+    return html.of_study(what, html.figure_of(of_robots(panels), alt, caption))
 
 
 def _bars(found: Sequence[Lead], endpoint: str) -> list[Bar]:

@@ -10,6 +10,7 @@ in as the results of `inbounds.study.statistics`; nothing here reads a file or c
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -56,12 +57,15 @@ class Curve:
     """`[E]` return and its band."""
 
 
-def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel: str = "return") -> Figure:
+def learning_curves(
+    curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel: str = "return", narrow: bool = False
+) -> Figure:
     """Draw learning curves with bands: a panel per environment, a line per policy family.
 
     Args:
         curves: per environment and family (a key of `LOOKS`) its curve, or None where the cell is missing.
         ylabel: what the curves show.
+        narrow: one panel below the other, for a phone.
 
     Returns:
         The figure; each panel has its own vertical scale, for returns of different robots share no unit.
@@ -79,7 +83,7 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
     """
     families = families_in(curves.values())
     with use_style():
-        fig, axes = panel_grid(list(curves), row_height=2.55)
+        fig, axes = panel_grid(list(curves), row_height=2.55, narrow=narrow)
         for ax, cells in zip(axes, curves.values(), strict=True):
             for family, curve in cells.items():
                 if curve is not None:
@@ -90,11 +94,11 @@ def learning_curves(curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel:
             if not any(cells.values()):
                 without_scale(ax, "both")
         fig.supylabel(ylabel, fontsize=13)
-        for ax in lowest(axes):
-            ax.set_xlabel("env steps per seed [millions]")
-        family_legend(fig, families)
+        for ax in lowest(axes, narrow=narrow):
+            ax.set_xlabel("env steps per seed [millions]", **({"fontsize": SMALL} if narrow else {}))
+        family_legend(fig, families, narrow=narrow)
         drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
-        note(fig, "Line", "Band", drawn, ", at each epoch by itself")
+        note(fig, "Line", "Band", drawn, ", at each epoch by itself", narrow=narrow)
     return fig
 
 
@@ -120,6 +124,7 @@ def interval_panels(
     *,
     xlabel: str = "mean return over the last 10 % of epochs",
     reference: float | None = None,
+    narrow: bool = False,
 ) -> Figure:
     """Draw point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
 
@@ -128,6 +133,7 @@ def interval_panels(
             and another does not keeps its row there, as not planned.
         xlabel: what is estimated, with its unit.
         reference: where to draw a vertical line, such as 0 for differences.
+        narrow: one panel below the other, for a phone.
 
     Returns:
         The figure; a hollow marker means that seeds were left out, and the row says how many.
@@ -143,24 +149,26 @@ def interval_panels(
         ['Gaussian, clipped', 'Beta']
     """
     families = families_in(panels.values())
-    rows = {family: (LOOKS[family].label, family) for family in families}
+    rows = {f: (SHORT[f] if narrow else LOOKS[f].label, f) for f in families}
     cells = {
         title: {f: (given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
         for title, given in panels.items()
     }
-    return _bars(cells, rows, xlabel, reference)
+    return _bars(cells, rows, xlabel, reference, narrow=narrow)
 
 
 def difference_panels(
     panels: Mapping[str, Mapping[tuple[str, str], Comparison]],
     *,
     xlabel: str = "difference of returns",
+    narrow: bool = False,
 ) -> Figure:
     """Draw differences between families with interval bars: a panel per environment, a row per pair.
 
     Args:
         panels: per environment and pair (first, second) of families their comparison, first minus second.
         xlabel: what the difference is of, with its unit.
+        narrow: one panel below the other, for a phone.
 
     Returns:
         The figure, with a line at zero; beside each bar stands the p-value after Holm's correction.
@@ -193,6 +201,7 @@ def difference_panels(
         xlabel,
         reference=0.0,
         remark="p: permutation test of the means, after Holm's correction over environments.",
+        narrow=narrow,
     )
 
 
@@ -202,10 +211,12 @@ def _bars(
     xlabel: str,
     reference: float | None,
     remark: str = "",
+    *,
+    narrow: bool = False,
 ) -> Figure:
     """Draw interval bars; `rows` gives each row's label and the family whose look it wears."""
     with use_style():
-        fig, axes = panel_grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True)
+        fig, axes = panel_grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True, narrow=narrow)
         for ax, given in zip(axes, cells.values(), strict=True):
             for place, (key, (estimate, remark_here)) in enumerate(given.items()):
                 _bar(ax, place, rows[key][1], estimate, remark_here)
@@ -221,9 +232,9 @@ def _bars(
             ax.margins(x=0.12)
             ax.xaxis.set_major_locator(MaxNLocator(3))
         # One label for all panels; below them it would lie on the note, which the layout engine places there.
-        fig.suptitle(xlabel[:1].upper() + xlabel[1:], fontsize=13)
+        fig.suptitle(textwrap.fill(xlabel[:1].upper() + xlabel[1:], 32 if narrow else 80), fontsize=13)
         drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
-        note(fig, "Marker", "Bar", drawn, "", remark)
+        note(fig, "Marker", "Bar", drawn, "", remark, narrow=narrow)
     return fig
 
 

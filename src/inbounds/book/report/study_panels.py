@@ -9,7 +9,7 @@ from typing import Any, Literal
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style
+from inbounds.book.drawing.figures import LOOKS, NARROW, WIDTH, family_style
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import percent
 
@@ -27,14 +27,20 @@ def families_in(panels: Iterable[Mapping[str, Any]]) -> list[str]:
     return [family for family in LOOKS if family in named]
 
 
-def panel_grid(titles: list[str], row_height: float, *, sharey: bool = False) -> tuple[Figure, list[Any]]:
-    """Return a figure of titled panels, two a row (one where there is one), without empty ones."""
+def panel_grid(
+    titles: list[str], row_height: float, *, sharey: bool = False, narrow: bool = False
+) -> tuple[Figure, list[Any]]:
+    """Return a figure of titled panels, two a row (one where there is one, or on a phone), without empty ones."""
     if not titles:
         raise ValueError("nothing to draw: pass at least one panel")
-    columns = min(2, len(titles))
+    columns = 1 if narrow else min(2, len(titles))
     rows = -(-len(titles) // columns)
     fig, axes = plt.subplots(
-        rows, columns, squeeze=False, sharey=sharey, figsize=(WIDTH, 1.3 + row_height * rows)
+        rows,
+        columns,
+        squeeze=False,
+        sharey=sharey,
+        figsize=(NARROW if narrow else WIDTH, 1.3 + row_height * rows),
     )
     panels = list(axes.flat)
     for ax in panels[len(titles) :]:
@@ -44,9 +50,9 @@ def panel_grid(titles: list[str], row_height: float, *, sharey: bool = False) ->
     return fig, panels[: len(titles)]
 
 
-def lowest(axes: list[Any]) -> list[Any]:
+def lowest(axes: list[Any], *, narrow: bool = False) -> list[Any]:
     """Return the panels with none below them."""
-    return axes[-2:] if len(axes) > 1 else axes
+    return axes[-1:] if narrow else axes[-2:]
 
 
 def left_out(estimate: Estimate) -> str:
@@ -81,13 +87,26 @@ def without_scale(ax: Any, axis: Literal["x", "both"]) -> None:
     ax.grid(visible=False, axis=axis)
 
 
-def family_legend(fig: Figure, families: list[str]) -> None:
+def family_legend(fig: Figure, families: list[str], *, narrow: bool = False) -> None:
     """Put one legend above all panels, of every family that has a place in the figure."""
     handles = [plt.Line2D([], [], marker=LOOKS[family].marker, **family_style(family)) for family in families]
-    fig.legend(handles=handles, loc="outside upper center", ncols=2 if len(families) in (2, 4) else 3)
+    fig.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=1 if narrow else 2 if len(families) in (2, 4) else 3,
+    )
 
 
-def note(fig: Figure, mark: str, band: str, drawn: list[Estimate], where: str, remark: str = "") -> None:
+def note(
+    fig: Figure,
+    mark: str,
+    band: str,
+    drawn: list[Estimate],
+    where: str,
+    remark: str = "",
+    *,
+    narrow: bool = False,
+) -> None:
     """Say below the panels what is drawn, what the interval is, and of how many seeds: one kind a figure."""
     kinds = sorted({(estimate.statistic, estimate.level) for estimate in drawn})
     if len(kinds) > 1:
@@ -106,5 +125,8 @@ def note(fig: Figure, mark: str, band: str, drawn: list[Estimate], where: str, r
         )
     # A legend of nothing but its title: the layout engine keeps room for it below the panels.
     fig.legend(
-        handles=[], title=textwrap.fill(text.strip(), 80), title_fontsize=SMALL, loc="outside lower left"
+        handles=[],
+        title=textwrap.fill(text.strip(), 40 if narrow else 80),
+        title_fontsize=SMALL,
+        loc="outside lower left",
     )

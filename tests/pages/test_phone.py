@@ -1,0 +1,75 @@
+"""The built book at 360 pixels: six robots stand in one column, and no punctuation stands on a line alone."""
+
+import pytest
+from playwright.sync_api import BrowserContext, Page
+
+from tests.pages import browser as book
+
+# Lines of the text that hold nothing but closing punctuation.
+LONELY = r"""() => {
+  const whole = 'mjx-container, img, svg, video, button, input';
+  const found = [];
+  for (const block of document.querySelectorAll('article :is(p, li, dd, td, th, h1, h2, h3, figcaption)')) {
+    if (!block.getClientRects().length || block.querySelector(':scope > :is(p, ul, ol)')) continue;
+    const lines = [];
+    const add = ({ top, bottom, width }, text) => {
+      const line = lines.find((l) => (top + bottom) / 2 > l.top && (top + bottom) / 2 < l.bottom);
+      if (width && line) line.text += text;
+      else if (width) lines.push({ top, bottom, text });
+    };
+    for (const node of block.querySelectorAll(whole)) add(node.getBoundingClientRect(), 'X');
+    const walker = document.createTreeWalker(block, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+      const node = walker.currentNode;
+      if (node.parentElement.closest('mjx-container, svg')) continue;
+      for (let i = 0; i < node.length; i++) {
+        const range = document.createRange();
+        range.setStart(node, i);
+        range.setEnd(node, i + 1);
+        if (node.data[i].trim()) add(range.getBoundingClientRect(), node.data[i]);
+      }
+    }
+    for (const { text } of lines) if (/^[.,;:!?)\]’”]+$/.test(text)) found.push([text, block.textContent.slice(0, 60)]);
+  }
+  return found;
+}"""
+SEVERAL = [
+    "book/bibliography.html",
+    "notebooks/what_happened.html",
+    "notebooks/kl_invariance.html",
+    "notebooks/ppo.html",
+]
+
+
+def on_a_phone(context: BrowserContext, url: str) -> Page:
+    page = context.new_page()
+    page.set_viewport_size(book.PHONE)
+    page.goto(url)
+    page.evaluate(book.AT_REST)
+    return page
+
+
+@pytest.mark.parametrize("name", ["notebooks/what_happened.html", "notebooks/figures_of_the_thesis.html"])
+def test_six_robots_stand_in_one_column_that_fits(context: BrowserContext, address: str, name: str) -> None:
+    page = on_a_phone(context, address + name)
+    pictures = page.locator(".inbounds-study picture")
+    assert pictures.count() >= 3
+    for picture in pictures.all():
+        image, narrow = picture.locator("img"), picture.locator("source").get_attribute("srcset")
+        image.scroll_into_view_if_needed()
+        assert image.evaluate("node => node.currentSrc") == narrow
+        assert picture.evaluate(
+            "node => node.closest('figure').scrollWidth <= node.closest('figure').clientWidth"
+        )
+        box = image.bounding_box()
+        assert box is not None
+        assert 250 < box["width"] <= book.PHONE["width"]
+    page.set_viewport_size(book.DESKTOP)
+    assert page.locator(".inbounds-study picture img").first.evaluate(
+        "node => node.currentSrc !== node.parentElement.querySelector('source').srcset"
+    )
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_no_punctuation_stands_alone_on_a_line(context: BrowserContext, address: str, name: str) -> None:
+    assert on_a_phone(context, address + name).evaluate(LONELY) == []
