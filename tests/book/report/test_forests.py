@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from inbounds.book.drawing.figures import NARROW
 from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
+from inbounds.book.report.study_panels import NARROW
 from inbounds.study.statistics import Estimate
 
 

@@ -10,9 +10,10 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, NARROW, WIDTH, png_bytes
+from inbounds.book.drawing.figures import LOOKS, WIDTH, png_bytes
 from inbounds.book.report import study_figures
 from inbounds.book.report.study_figures import Curve
+from inbounds.book.report.study_panels import NARROW
 from inbounds.study import statistics
 
 ROBOTS = ["HalfCheetah-v5", "Hopper-v5", "Swimmer-v5", "Walker2d-v5", "Ant-v5", "Humanoid-v5"]

@@ -44,7 +44,7 @@ class Page(HTMLParser):
         self.addresses += [values[name] for name in ("src", "href") if name in values]
         if tag == "img":
             self.images.append(values["alt"])
-        if tag not in ("meta", "img", "br", "!doctype"):
+        if tag not in ("meta", "img", "source", "br", "!doctype"):
             self.open.append(tag)
         if tag == "tr":
             self.tables[self.caption].append([])

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 __all__ = [
     "LOOKS",
     "MAX_DENSITY",
-    "NARROW",
     "SHADES",
     "STYLE",
     "WIDTH",
@@ -57,9 +56,6 @@ __all__ = [
 
 WIDTH = 6.8
 """Width of a figure in inches: 680 CSS pixels, the text column of the book on a laptop."""
-
-NARROW = 3.4
-"""Width of a figure on a phone in inches: 340 CSS pixels, shown on a page of 360 at most a little smaller."""
 
 MAX_DENSITY = 4.0
 """Where density panels end: a density may be unbounded at the ends of its support."""

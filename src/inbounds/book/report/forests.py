@@ -16,7 +16,8 @@ from types import MappingProxyType
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, NARROW, SHADES, WIDTH, use_style
+from inbounds.book.drawing.figures import LOOKS, SHADES, WIDTH, use_style
+from inbounds.book.report.study_panels import NARROW
 from inbounds.study.grid import ROBOTS
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import spoken

@@ -16,7 +16,7 @@ from inbounds.book.templates import macros
 KIND = "inbounds-study"
 """Class by which the book's style sheet knows a view of the study."""
 COLORS = 128
-"""Of a figure in two shapes: as many as bands and lines need, and together no more bytes than one with all its colours."""
+"""Of a figure in two shapes: as many as bands and lines need, and both together no more bytes than one with all."""
 _HTML = macros("report")
 
 

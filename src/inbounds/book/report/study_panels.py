@@ -9,10 +9,12 @@ from typing import Any, Literal
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from inbounds.book.drawing.figures import LOOKS, NARROW, WIDTH, family_style
+from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import percent
 
+NARROW = 3.4
+"""Width of a figure on a phone in inches: 340 CSS pixels, which a page of 360 shows a little smaller."""
 SMALL = 11.0
 """Font size of notes, in points."""
 
