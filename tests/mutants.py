@@ -644,10 +644,10 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "an environment's neighbours are not disturbed",
-        "book/environment_checks.py",
+        "book/exercises/checks/environment.py",
         "    changed[:, 1:] = random_actions(envs, SHORT, seed=1)[:, 1:]\n",
         "",
-        "tests/book/test_environment_checks.py::test_the_reason_is_said",
+        "tests/book/exercises/checks/test_environment.py::test_the_reason_is_said",
     ),
     Mutant(
         "a box is centred on zero",

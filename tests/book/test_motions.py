@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inbounds.book import motions
-from inbounds.book.over_seeds import final_policies
+from inbounds.book.report.over_seeds import final_policies
 from inbounds.study import StudyFolder, store
 from inbounds.study.grid import AFTERWARDS
 from inbounds.study.outcomes import Outcomes

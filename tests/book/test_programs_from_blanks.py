@@ -10,9 +10,9 @@ import pytest
 import torch
 
 from inbounds.book.exercises import ppo, trpo
+from inbounds.book.exercises.checks.small_updates import PPO, Small
 from inbounds.book.exercises.judging import Judgement
 from inbounds.book.pages import programs
-from inbounds.book.small_updates import PPO, Small
 from tests.book import by_hand
 from tools import student_copies
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inbounds.book.over_seeds import final_policies
+from inbounds.book.report.over_seeds import final_policies
 from inbounds.book.resumed import learn_values, resumed
 from inbounds.learning import Trainer
 from inbounds.study import StudyFolder

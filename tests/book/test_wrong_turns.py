@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from inbounds.book import trpo_updates
 from inbounds.book.exercises import advantages_of_actions, many_steps_from_one_batch, ppo, trpo
+from inbounds.book.exercises.checks import trpo_updates
+from inbounds.book.exercises.checks.small_updates import FAR, QUIET, Small
 from inbounds.book.exercises.judging import Judgement
-from inbounds.book.small_updates import FAR, QUIET, Small
 from tests.book.test_programs_from_blanks import changed
 
 LAW = "self.law(self.net(obs)).log_prob(latent).sum(-1)"

@@ -19,7 +19,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from inbounds import robots
-from inbounds.book.over_seeds import final_policies
+from inbounds.book.report.over_seeds import final_policies
 from inbounds.learning import TrainedPolicy, Trainer, preset
 from inbounds.study import store
 from inbounds.study.grid import AFTERWARDS

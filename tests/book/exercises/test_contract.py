@@ -93,7 +93,10 @@ GRADERS = [
 def test_a_chapter_s_graders_have_its_name() -> None:
     graded = {chapter for chapter, modules in CHAPTERS.items() if modules}
     assert all(CHAPTERS[chapter] == [chapter] for chapter in graded)
-    assert {module.name for module in pkgutil.iter_modules(exercises.__path__)} == graded | {"judging"}
+    assert {module.name for module in pkgutil.iter_modules(exercises.__path__)} == graded | {
+        "judging",
+        "checks",
+    }
     assert {grader.__module__.rpartition(".")[2] for grader in GRADERS} == graded
 
 

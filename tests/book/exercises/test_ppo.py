@@ -10,8 +10,8 @@ from torch import nn
 from torch.distributions import Normal, kl_divergence
 
 from inbounds.book.exercises import ppo as graders
-from inbounds.book.ppo_checks import CHECKS
-from inbounds.book.small_updates import PPO, Small
+from inbounds.book.exercises.checks.ppo import CHECKS
+from inbounds.book.exercises.checks.small_updates import PPO, Small
 
 
 def capped(ratio, advantage, clip_range):

@@ -9,7 +9,7 @@ import torch
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from inbounds.book.exercises import trpo as graders
-from inbounds.book.trpo_checks import CHECKS
+from inbounds.book.exercises.checks.trpo import CHECKS
 from tests.book.exercises.test_ppo import right_advantages
 
 

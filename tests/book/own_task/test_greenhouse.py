@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from inbounds.book.environment_checks import complaints
+from inbounds.book.exercises.checks.environment import complaints
 from inbounds.book.own_task import constant, greedy, greenhouse_runs, play
 from inbounds.book.own_task import greenhouse as house
 from inbounds.learning import Trainer

@@ -1,7 +1,7 @@
 """Graders of the chapter *PPO* (`judging` tells how one works): one for each function of the program that it writes.
 
-A loss is judged by the named checks of `inbounds.book.ppo_checks`; the verdict names the first that fails. A whole
-update is judged by where it takes the weights, beside `inbounds.learning.ppo.update`.
+A loss is judged by the named checks of `inbounds.book.exercises.checks.ppo`; the verdict names the first that fails. A
+whole update is judged by where it takes the weights, beside `inbounds.learning.ppo.update`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import torch
 from torch import Tensor
 from torch.distributions import Normal
 
+from inbounds.book.exercises.checks.ppo import CHECKS, Loss, Scene, policy_loss
+from inbounds.book.exercises.checks.small_updates import PPO, SEED, Small, explained
 from inbounds.book.exercises.judging import (
     Case,
     Judgement,
@@ -22,8 +24,6 @@ from inbounds.book.exercises.judging import (
     judge_cases,
     judge_diagnosis,
 )
-from inbounds.book.ppo_checks import CHECKS, Loss, Scene, policy_loss
-from inbounds.book.small_updates import PPO, SEED, Small, explained
 
 __all__ = ["diagnosis", "loss", "policy", "surrogate", "update"]
 

@@ -1,8 +1,8 @@
 """Graders of the chapter *TRPO* (`judging` tells how one works): one for each function of the program that it writes.
 
-A policy step is judged by the named checks of `inbounds.book.trpo_checks`, on problems whose answer dense linear
-algebra knows; the verdict names the first that fails. A whole update is judged by where it takes the weights, beside
-`inbounds.learning.trpo.update`.
+A policy step is judged by the named checks of `inbounds.book.exercises.checks.trpo`, on problems whose answer dense
+linear algebra knows; the verdict names the first that fails. A whole update is judged by where it takes the weights,
+beside `inbounds.learning.trpo.update`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,19 @@ import torch
 from torch import Tensor
 from torch.nn.utils import parameters_to_vector
 
-from inbounds.book import trpo_updates
+from inbounds.book.exercises.checks import trpo_updates
+from inbounds.book.exercises.checks.small_updates import explained
+from inbounds.book.exercises.checks.trpo import (
+    CHECKS,
+    DAMPING,
+    MAX_KL,
+    Problem,
+    Step,
+    parallel,
+    problem,
+    round_problem,
+)
 from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
-from inbounds.book.small_updates import explained
-from inbounds.book.trpo_checks import CHECKS, DAMPING, MAX_KL, Problem, Step, parallel, problem, round_problem
 
 __all__ = [
     "conjugate_gradient",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from inbounds.book.environment_checks import CHECKS, MakeEnvs
+from inbounds.book.exercises.checks.environment import CHECKS, MakeEnvs
 from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
 
 __all__ = ["diagnosis", "own_environment", "value_under_a_clock"]
@@ -44,7 +44,7 @@ def value_under_a_clock(function: Callable[..., Any]) -> Judgement:
 
 
 def own_environment(make: MakeEnvs) -> Judgement:
-    """All checks of `inbounds.book.environment_checks`, on the reader's environment.
+    """All checks of `inbounds.book.exercises.checks.environment`, on the reader's environment.
 
     Args:
         make: the reader's function (or class), which makes a vector environment for a number of seeds.

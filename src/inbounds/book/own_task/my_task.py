@@ -20,7 +20,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
-from inbounds.book.environment_checks import complaints
+from inbounds.book.exercises.checks.environment import complaints
 from inbounds.book.own_task import best_of, compare, constant, greedy, noisy, play
 from inbounds.learning import TrainConfig, preset, train
 from inbounds.study.statistics import Estimate

@@ -235,7 +235,7 @@ class Small:
         """Return the critic's weights `[P]` after TRPO's regression with one mistake; the critic is moved.
 
         Args:
-            flaw: a value of `inbounds.book.trpo_updates.MISTAKES`; "" is none.
+            flaw: a value of `inbounds.book.exercises.checks.trpo_updates.MISTAKES`; "" is none.
             config: of the step.
         """
         target, adam = self._advantages()[flaw != "advantages"], self.adam(config)

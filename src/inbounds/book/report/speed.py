@@ -28,7 +28,7 @@ from inbounds.book.drawing import alt_text
 from inbounds.book.report.html import Shown, bullets, missing, table
 from inbounds.study.words import percent
 
-ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/book/speed.py
+ROOT = Path(__file__).resolve().parents[4]  # src/inbounds/book/report/speed.py
 RESULTS = ROOT / "benchmarks" / "results"
 
 Results: TypeAlias = Mapping[str, Any]

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from inbounds.book import speed
+from inbounds.book.report import speed
 from tests.made_up_speed import made_up_results, ppo_turns, turn
 
 

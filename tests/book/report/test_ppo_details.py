@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inbounds.book import ppo_details
-from inbounds.book.ppo_details import DETAILS, effect_table, effects, not_measured, tally_of
+from inbounds.book.report import ppo_details
+from inbounds.book.report.ppo_details import DETAILS, effect_table, effects, not_measured, tally_of
 from inbounds.study.grid import VARIANTS, Cell, all_cells
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.store import StudyFolder

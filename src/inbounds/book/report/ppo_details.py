@@ -2,7 +2,7 @@
 
 ::
 
-    from inbounds.book.ppo_details import effect_table, effects
+    from inbounds.book.report.ppo_details import effect_table, effects
 
     effect_table(effects("../results"))
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from inbounds import robots
-from inbounds.book.environment_checks import CHECKS, complaints
 from inbounds.book.exercises import your_own_environment as graders
+from inbounds.book.exercises.checks.environment import CHECKS, complaints
 from tests.learning.point import PointEnv
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from inbounds.book.small_updates import FAR, QUIET, SEED, TRPO, Small
+from inbounds.book.exercises.checks.small_updates import FAR, QUIET, SEED, TRPO, Small
 from inbounds.learning import TRPOConfig
 
 __all__ = ["MISTAKES", "complaint"]

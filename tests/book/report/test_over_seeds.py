@@ -6,7 +6,7 @@ import pytest
 from scipy import stats
 
 from inbounds.book.drawing import figures
-from inbounds.book.over_seeds import MANY, draw, final_policies, mean_of, minus
+from inbounds.book.report.over_seeds import MANY, draw, final_policies, mean_of, minus
 from inbounds.study import grid
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import difference

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor, nn
 
-from inbounds.book.small_updates import Batch
+from inbounds.book.exercises.checks.small_updates import Batch
 from inbounds.learning.families import NORMAL, Limits
 from inbounds.learning.families.gaussian import normal_entropy
 
