@@ -159,7 +159,7 @@ class SigmoidMapped(BoundedDistribution):
 
     @constraints.dependent_property(is_discrete=False, event_dim=0)
     def support(self) -> constraints.Constraint:
-        """The open interval (low, high)."""
+        """Return the open interval (low, high)."""
         return OpenInterval(self.low, self.high)
 
     def latent_to_value(self, latent: Tensor) -> Tensor:

@@ -32,7 +32,7 @@ def require_box(space: Any) -> None:
 
 
 def _remedy(space: Any) -> tuple[str, str] | None:
-    """The rule that a space breaks, and what to do about it; None where it breaks none."""
+    """Return the rule that a space breaks, and what to do about it; None where it breaks none."""
     import gymnasium  # here, because the laws themselves do without it
 
     wrapped = "gymnasium.wrappers.TransformAction(env, {}, box), where box is {}"

@@ -244,7 +244,7 @@ class _Parts(NamedTuple):
 
 @register_kl(ClippedNormal, ClippedNormal)
 def _kl_clipped_normal_clipped_normal(p: ClippedNormal, q: ClippedNormal) -> Tensor:
-    """KL(p‖q) of the mixed laws, in nats, elementwise and exact.
+    """Return KL(p‖q) of the mixed laws, in nats, elementwise and exact.
 
     Σ_bounds P log(P/Q) + ∫ p log(p/q): with r = σ_p/σ_q and d = (μ_p − μ_q)/σ_q the integral is
     −M₀ log r + ½[(r² − 1) M₂ + 2rd M₁ + d² M₀].

@@ -248,6 +248,6 @@ def _sigmoid_difference(z: Tensor, step: Tensor) -> Tensor:
 
 @register_kl(LogitNormal, LogitNormal)
 def _kl_logit_normal_logit_normal(p: LogitNormal, q: LogitNormal) -> Tensor:
-    """KL(p‖q) of the latent Normals, in nats, elementwise: exact, because KL is invariant under a bijection."""
+    """Return KL(p‖q) of the latent Normals, in nats, elementwise: exact, as KL is invariant under a bijection."""
     require_equal_bounds(p, q)
     return kl_divergence(p._normal(), q._normal())

@@ -249,7 +249,7 @@ def _rsample_log_gamma(concentration: Tensor, generator: torch.Generator | None)
 
 @register_kl(ScaledBeta, ScaledBeta)
 def _kl_scaled_beta_scaled_beta(p: ScaledBeta, q: ScaledBeta) -> Tensor:
-    """KL(p‖q) in nats, elementwise, in closed form; evaluated in float64, returned in the parameters' type."""
+    """Return KL(p‖q) in nats, elementwise, in closed form: evaluated in float64, of the parameters' type."""
     require_equal_bounds(p, q)
     (alpha_p, beta_p), (alpha_q, beta_q) = p._concentrations(), q._concentrations()
     divergence = (

@@ -42,9 +42,9 @@ def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
     """Return robots with one of the six tasks, in one vector environment.
 
     Args:
-        name: of the task, such as ``"HalfCheetah-v5"``.
+        name: of the task, such as `"HalfCheetah-v5"`.
         num_envs: number of robots.
-        **kwargs: as for :class:`inbounds.robots.RobotVectorEnv`.
+        **kwargs: as for `inbounds.robots.RobotVectorEnv`.
 
     Returns:
         The environment.

@@ -1,6 +1,6 @@
 """Ant and Humanoid: the two tasks that feel the forces of their contacts.
 
-Gymnasium calls ``mj_rnePostConstraint`` after each step to know these forces. A batch does not compute them, so
+Gymnasium calls `mj_rnePostConstraint` after each step to know these forces. A batch does not compute them, so
 they are computed here, robot by robot where something touches, from the data that a persistent batch keeps. That
 costs some 7 µs a touching robot and step, one to three per cent of the physics.
 """
@@ -14,7 +14,7 @@ from inbounds.robots.tasks import Action, Array, Flags, Task, place_on_ground, s
 
 
 class ContactTask(Task):
-    """A task with contact forces ``[N, bodies, 6]`` (torque, then force, on each body) [N·m, N]."""
+    """A task with contact forces `[N, bodies, 6]` (torque, then force, on each body) [N·m, N]."""
 
     hidden = 2
     feels_contacts = True
@@ -39,7 +39,7 @@ class ContactTask(Task):
         self.contact_forces[robots] = 0.0
 
     def where(self) -> dict[str, NDArray]:
-        """Place on the ground and distance from the origin [m]."""
+        """Return the place on the ground and the distance from the origin [m]."""
         return place_on_ground(self.qpos)
 
 
@@ -88,22 +88,22 @@ class Ant(ContactTask):
         self._torso: Array = batch.bind("xpos")[:, 1]  # [N, 3], live
 
     def observe(self) -> Array:
-        """Posture, velocities and clipped contact forces, ``[N, 105]``."""
+        """Return posture, velocities and clipped contact forces, `[N, 105]`."""
         forces = np.clip(self.contact_forces[:, 1:], -1, 1)  # the first body is the world
         return np.concatenate((super().observe(), forces.reshape(len(forces), -1)), axis=1)
 
     def position(self) -> Array:
-        """The torso as the physics last saw it, one physics step behind ``qpos``; Gymnasium rewards this one."""
+        """Return the torso as the physics last saw it, one physics step behind `qpos`; Gymnasium rewards this one."""
         return self._torso[:, :2].copy()
 
     def is_healthy(self) -> Flags:
-        """Neither too low nor too high, and all finite; an ant on its back may be healthy."""
+        """Return who is neither too low nor too high, and all finite; an ant on its back may be healthy."""
         height = self.qpos[:, 2]
         is_finite = np.isfinite(self.qpos).all(axis=1) & np.isfinite(self.qvel).all(axis=1)
         return is_finite & (height >= 0.2) & (height <= 1.0)
 
     def contact_cost(self) -> Array:
-        """Weighted squared norm of the clipped contact forces, ``[N]``."""
+        """Return the weighted squared norm of the clipped contact forces, `[N]`."""
         forces = np.clip(self.contact_forces, -1, 1).reshape(len(self.contact_forces), -1)
         return self.contact_weight * squared_norm(forces)
 
@@ -165,7 +165,7 @@ class Humanoid(ContactTask):
         }
 
     def observe(self) -> Array:
-        """Posture, velocities, inertia, torques and contact forces, ``[N, 348]``."""
+        """Return posture, velocities, inertia, torques and contact forces, `[N, 348]`."""
         count = len(self.qpos)
         parts = (
             super().observe(),
@@ -177,22 +177,22 @@ class Humanoid(ContactTask):
         return np.concatenate(parts, axis=1)
 
     def position(self) -> Array:
-        """The centre of mass on the ground, as the physics last saw it, ``[N, 2]`` [m]."""
+        """Return the centre of mass on the ground, as the physics last saw it, `[N, 2]` [m]."""
         return (np.einsum("b,nbj->nj", self._mass, self._body_centres) / self._mass.sum())[:, :2]
 
     def is_healthy(self) -> Flags:
-        """Neither fallen nor flying."""
+        """Return who is neither fallen nor flying."""
         return (self.qpos[:, 2] > 1.0) & (self.qpos[:, 2] < 2.0)
 
     def control_cost(self, action: Action) -> Array:
-        """Gymnasium charges this robot for the simulator's controls: the action in float64."""
+        """Return what Gymnasium charges this robot for: the simulator's controls, which are the action in float64."""
         return super().control_cost(self.ctrl)
 
     def contact_cost(self) -> Array:
-        """Weighted squared norm of the contact forces, limited, ``[N]``."""
+        """Return the weighted squared norm of the contact forces, limited, `[N]`."""
         forces = self.contact_forces.reshape(len(self.contact_forces), -1)
         return np.minimum(self.contact_weight * squared_norm(forces), self.contact_limit)
 
     def where(self) -> dict[str, NDArray]:
-        """Place on the ground and distance from the origin [m], lengths and rates of the two tendons [m, m/s]."""
+        """Return place on the ground, distance from the origin [m], lengths and rates of the two tendons [m, m/s]."""
         return super().where() | {name: values.copy() for name, values in self._tendons.items()}

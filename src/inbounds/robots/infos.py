@@ -9,7 +9,7 @@ Info = dict[str, Any]
 
 
 def masked(info: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> Info:
-    """Put a mask ``[N]`` beside each value ``[N, …]``, under the same key with a leading underscore.
+    """Put a mask `[N]` beside each value `[N, …]`, under the same key with a leading underscore.
 
     Example:
         >>> masked({"x_position": np.zeros(2)}, np.array([True, False]))

@@ -2,7 +2,7 @@
 
 Left alone, MuJoCo prints a warning to standard error and appends it to a file MUJOCO_LOG.TXT in the working
 directory. Here one handler takes both places: it drops the single message that is known and harmless, and passes
-every other on to :mod:`warnings`. It is installed when :mod:`inbounds.robots` first imports MuJoCo.
+every other on to `warnings`. It is installed when `inbounds.robots` first imports MuJoCo.
 """
 
 import warnings

@@ -1,8 +1,8 @@
-"""The six tasks under Gymnasium's own roof: ``gymnasium.make_vec("inbounds/HalfCheetah-v5", num_envs=10)``.
+"""The six tasks under Gymnasium's own roof: `gymnasium.make_vec("inbounds/HalfCheetah-v5", num_envs=10)`.
 
-The ids are ``inbounds/`` and Gymnasium's name of the task: the same task to the last bit, another engine under it.
-They are known once :mod:`inbounds.robots.vector_env` has been imported, as :func:`inbounds.robots.make` does; or the
-id itself names the module to import: ``"inbounds.robots.vector_env:inbounds/HalfCheetah-v5"``.
+The ids are `inbounds/` and Gymnasium's name of the task: the same task to the last bit, another engine under it.
+They are known once `inbounds.robots.vector_env` has been imported, as `inbounds.robots.make` does; or the
+id itself names the module to import: `"inbounds.robots.vector_env:inbounds/HalfCheetah-v5"`.
 """
 
 from gymnasium.envs import registration
@@ -13,7 +13,7 @@ MAX_EPISODE_STEPS = 1000
 
 
 def register() -> None:
-    """Register the tasks for :func:`gymnasium.make_vec`; repeated calls do no harm.
+    """Register the tasks for `gymnasium.make_vec`; repeated calls do no harm.
 
     Example:
         >>> import gymnasium

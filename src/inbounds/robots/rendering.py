@@ -49,7 +49,7 @@ class Film:
     """Frames and the rate at which they show real time.
 
     Attributes:
-        frames: ``[T, height, width, 3]``, 8-bit RGB.
+        frames: `[T, height, width, 3]`, 8-bit RGB.
         fps: frames per second of simulated time.
         total_reward: sum of the rewards collected while the film was made.
 
@@ -65,7 +65,7 @@ class RobotRenderer:
     """Draws one robot of an environment, as often as asked, from the state it is in.
 
     Args:
-        env: a Gymnasium MuJoCo environment (wrapped or not), a ``SyncVectorEnv`` of such, or one of this
+        env: a Gymnasium MuJoCo environment (wrapped or not), a `SyncVectorEnv` of such, or one of this
             package's vector environments.
         index: which robot of a vector environment.
         width: of the frame [pixels].
@@ -112,7 +112,7 @@ class RobotRenderer:
         self._has_sky = bool(np.any(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX))
 
     def frame(self, index: int | None = None) -> Frame:
-        """The robot as it stands now, ``[height, width, 3]``, a new array.
+        """Return the robot as it stands now, `[height, width, 3]`, a new array.
 
         Args:
             index: which robot of a vector environment; by default the renderer's own.
@@ -172,12 +172,12 @@ def record(
 ) -> Film:
     """Reset an environment, let a policy act in it, and film one robot in real time.
 
-    An episode that ends is followed by the next. Steps faster than ``max_fps`` are filmed at every second, third, …
+    An episode that ends is followed by the next. Steps faster than `max_fps` are filmed at every second, third, …
 
     Args:
-        env: as for :class:`RobotRenderer`.
-        policy: from observations to actions, both as the environment has them: ``[O] → [A]`` for a
-            single environment, ``[N, O] → [N, A]`` for a vector environment.
+        env: as for `RobotRenderer`.
+        policy: from observations to actions, both as the environment has them: `[O] → [A]` for a
+            single environment, `[N, O] → [N, A]` for a vector environment.
         seconds: simulated time to film.
         seed: for the environment's reset; None continues its generator.
         index: which robot of a vector environment.
@@ -235,7 +235,7 @@ def is_drawable(env: Any) -> bool:
 
 
 def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], mujoco.MjData]]:
-    """The model of an environment, and a function from a robot's index to its present data."""
+    """Return an environment's model, and a function from a robot's index to its present data."""
     count = getattr(env, "num_envs", 1)
     if not 0 <= index < count:
         raise IndexError(f"index {index} is out of range: this environment has robots 0 to {count - 1}")
@@ -252,13 +252,13 @@ def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], m
 
 
 def _step_time(env: Any) -> float:
-    """Simulated time of one environment step [s]."""
+    """Return the simulated time of one environment step [s]."""
     inner = env.unwrapped
     return float(inner.envs[0].unwrapped.dt if hasattr(inner, "envs") else inner.dt)
 
 
 def _quick_to_draw(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
-    """A copy of the model without what makes software rendering slow and videos large."""
+    """Return a copy of the model without what makes software rendering slow and videos large."""
     model = copy.copy(model)
     model.vis.quality.shadowsize = 0
     model.vis.quality.offsamples = 0
@@ -275,7 +275,7 @@ def _quick_to_draw(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjM
 
 
 def _extent(model: mujoco.MjModel) -> tuple[NDArray[np.float64], float, float]:
-    """Centre of mass, radius and range of heights [m] of the robot in its reference pose."""
+    """Return centre of mass, radius and range of heights [m] of the robot in its reference pose."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

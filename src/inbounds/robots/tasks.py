@@ -1,11 +1,11 @@
 """What a robot sees, what it is paid for, when it falls, and how it starts: four of Gymnasium's six v5 tasks.
 
-Each task is written once, for a batch: ``[N, …]`` arrays hold N robots, and every formula is Gymnasium's, in
+Each task is written once, for a batch: `[N, …]` arrays hold N robots, and every formula is Gymnasium's, in
 Gymnasium's order of operations, so that the numbers agree to the last bit. Ant and Humanoid, which also feel
-contact forces, are in :mod:`inbounds.robots.contact_tasks`.
+contact forces, are in `inbounds.robots.contact_tasks`.
 
 Actions are numbers in a box; a motor multiplies them by its gear. All lengths are in metres, angles in radians,
-torques in N·m, masses in kg. A step of the environment is ``frame_skip`` steps of the physics.
+torques in N·m, masses in kg. A step of the environment is `frame_skip` steps of the physics.
 
 Sources: Brockman et al. 2016, *OpenAI Gym*; Todorov, Erez & Tassa 2012, *MuJoCo*; the tasks' own papers are named
 in each docstring.
@@ -41,7 +41,7 @@ class Task:
     where a task without health or contacts lacks that term.
 
     Args:
-        batch: simulations of :meth:`load_model`'s model; the task keeps live views of their state.
+        batch: simulations of `load_model`'s model; the task keeps live views of their state.
     """
 
     name: ClassVar[str]
@@ -70,34 +70,34 @@ class Task:
 
     @classmethod
     def load_model(cls) -> mujoco.MjModel:
-        """The robot's MuJoCo model, from the files that Gymnasium ships."""
+        """Return the robot's MuJoCo model, from the files that Gymnasium ships."""
         return mujoco.MjModel.from_xml_path(str(_ASSETS / cls.xml_file))
 
     def observe(self) -> Array:
-        """What each robot sees now, ``[N, O]``, a new array."""
+        """Return what each robot sees now, `[N, O]`, a new array."""
         velocity = self.qvel
         if self.velocity_limit is not None:
             velocity = np.minimum(np.maximum(velocity, -self.velocity_limit), self.velocity_limit)
         return np.concatenate((self.qpos[:, self.hidden :], velocity), axis=1)
 
     def position(self) -> Array:
-        """The place whose rate of change is rewarded, ``[N, 1]`` (x) or ``[N, 2]`` (x, y) [m], a new array."""
+        """Return the place whose rate of change is rewarded, `[N, 1]` (x) or `[N, 2]` (x, y) [m], a new array."""
         return self.qpos[:, : self.hidden].copy()
 
     def is_healthy(self) -> Flags:
-        """Whether each robot is upright, ``[N]``; an unhealthy one terminates."""
+        """Return whether each robot is upright, `[N]`; an unhealthy one terminates."""
         return np.ones(len(self.qpos), np.bool_)
 
     def reward(self, velocity: Array, action: Action, is_healthy: Flags) -> tuple[Array, dict[str, NDArray]]:
         """Pay for one step.
 
         Args:
-            velocity: mean velocity over the step, ``[N, 1 or 2]`` [m/s].
-            action: what the robot received, ``[N, A]``; the cost is computed in its precision.
-            is_healthy: after the step, ``[N]``.
+            velocity: mean velocity over the step, `[N, 1 or 2]` [m/s].
+            action: what the robot received, `[N, A]`; the cost is computed in its precision.
+            is_healthy: after the step, `[N]`.
 
         Returns:
-            The reward ``[N]`` and its terms, whose sum it is (to rounding).
+            The reward `[N]` and its terms, whose sum it is (to rounding).
         """
         gain = forward = self.forward_weight * velocity[:, 0]
         cost = control = self.control_cost(action)
@@ -112,11 +112,11 @@ class Task:
         return gain - cost, terms
 
     def control_cost(self, action: Action) -> NDArray:
-        """What the action costs, ``[N]``, in the action's precision."""
+        """Return what the action costs, `[N]`, in the action's precision."""
         return self.control_weight * squared_norm(action)
 
     def contact_cost(self) -> Array:
-        """What the contacts cost, ``[N]``; only for a task that feels them."""
+        """Return what the contacts cost, `[N]`; only for a task that feels them."""
         raise NotImplementedError(f"{self.name} feels no contacts")
 
     def feel_contacts(self) -> None:
@@ -126,11 +126,11 @@ class Task:
         """Set the contact forces of these robots, just reset, to zero, where the task needs them."""
 
     def where(self) -> dict[str, NDArray]:
-        """What Gymnasium reports about the robots' whereabouts, at a reset and after a step, new arrays."""
+        """Return what Gymnasium reports about the robots' whereabouts, at a reset and after a step, new arrays."""
         return {"x_position": self.qpos[:, 0].copy()}
 
     def draw_start(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """One robot's initial ``qpos [nq]`` and ``qvel [nv]``: the reference pose and a little noise."""
+        """Return one robot's initial `qpos [nq]` and `qvel [nv]`: the reference pose and a little noise."""
         noise, count = self.reset_noise, (self.qvel.shape[1],)
         qpos = self.initial_qpos + rng.uniform(-noise, noise, self.initial_qpos.size)
         if self.reset_velocity_is_normal:
@@ -208,7 +208,7 @@ class Swimmer(Task):
     reset_noise = 0.1
 
     def where(self) -> dict[str, NDArray]:
-        """Place on the ground and distance from the origin [m]."""
+        """Return the place on the ground and the distance from the origin [m]."""
         return place_on_ground(self.qpos)
 
 
@@ -249,14 +249,14 @@ class Hopper(Task):
     reset_noise = 5e-3
 
     def is_healthy(self) -> Flags:
-        """High enough (but not infinitely), upright, and within ± 100 in all but x and z."""
+        """Return who is high enough (but not infinitely), upright, and within ± 100 in all but x and z."""
         others = np.concatenate((self.qpos[:, 2:], self.qvel), axis=1)
         others_are_small = np.logical_and.reduce(np.abs(others) < 100, axis=1)
         height, pitch = self.qpos[:, 1], self.qpos[:, 2]
         return others_are_small & (height > 0.7) & (height < np.inf) & (np.abs(pitch) < 0.2)
 
     def where(self) -> dict[str, NDArray]:
-        """Place along the track and height above the reference pose [m]."""
+        """Return the place along the track and the height above the reference pose [m]."""
         height = self.qpos[:, 1] - self.initial_qpos[1]
         return {"x_position": self.qpos[:, 0].copy(), "z_distance_from_origin": height}
 
@@ -293,13 +293,13 @@ class Walker2d(Hopper):
     xml_file = "walker2d_v5.xml"
 
     def is_healthy(self) -> Flags:
-        """Neither fallen nor flying, and upright."""
+        """Return who is neither fallen nor flying, and upright."""
         height, pitch = self.qpos[:, 1], self.qpos[:, 2]
         return (height > 0.8) & (height < 2.0) & (np.abs(pitch) < 1.0)
 
 
 def squared_norm(rows: NDArray[Any]) -> NDArray[Any]:
-    """Sum of squares of each row, in the order of NumPy's sum over one row: ``[N, K] → [N]``.
+    """Return the sum of squares of each row, in the order of NumPy's sum over one row: `[N, K] → [N]`.
 
     Example:
         >>> squared_norm(np.array([[3.0, 4.0], [1.0, 2.0]]))
@@ -310,7 +310,7 @@ def squared_norm(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def place_on_ground(qpos: Array) -> dict[str, NDArray]:
-    """Place (x, y) and distance from the origin [m] of robots that move on a plane, ``[N]`` each."""
+    """Return place (x, y) and distance from the origin [m] of robots that move on a plane, `[N]` each."""
     place = qpos[:, :2]
     return {
         "x_position": place[:, 0].copy(),

@@ -1,7 +1,7 @@
-"""Many robots, one environment: Gymnasium's v5 tasks stepped by one ``mujoco.batch.Batch``.
+"""Many robots, one environment: Gymnasium's v5 tasks stepped by one `mujoco.batch.Batch`.
 
-A robot whose episode ends is reset within the same step (``AutoresetMode.SAME_STEP``): the observation returned
-is the first of the new episode, the last of the old one is in ``info["final_obs"]``. Gymnasium's default, a reset
+A robot whose episode ends is reset within the same step (`AutoresetMode.SAME_STEP`): the observation returned
+is the first of the new episode, the last of the old one is in `info["final_obs"]`. Gymnasium's default, a reset
 in the *next* step, would put a transition into every rollout in which the action has no effect.
 """
 
@@ -33,20 +33,20 @@ TASKS: dict[str, type[Task]] = {
 class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
     """N robots with one task, stepped together.
 
-    Robot *i* seeded with *s* behaves, bit for bit, as ``gymnasium.make(name)`` reset with seed *s*; an integer
-    seed gives robot *i* the seed *s + i*, as in ``SyncVectorEnv``. Each robot has its own random generator,
+    Robot *i* seeded with *s* behaves, bit for bit, as `gymnasium.make(name)` reset with seed *s*; an integer
+    seed gives robot *i* the seed *s + i*, as in `SyncVectorEnv`. Each robot has its own random generator,
     so it does not matter which others run beside it. Arrays that are returned are the caller's own.
 
     Args:
-        name: of the task, a key of ``TASKS`` (which documents each), such as ``"HalfCheetah-v5"``.
+        name: of the task, a key of `TASKS` (which documents each), such as `"HalfCheetah-v5"`.
         num_envs: number of robots, N.
-        action_mode: what happens to an action outside the box. ``"clip"``: it is clipped before robot and
-            reward see it, as by ``gymnasium.wrappers.ClipAction``. ``"raw"``: it is passed on as it is;
+        action_mode: what happens to an action outside the box. `"clip"`: it is clipped before robot and
+            reward see it, as by `gymnasium.wrappers.ClipAction`. `"raw"`: it is passed on as it is;
             the simulator clamps the torque, but the control cost is charged for the full action,
             as Gymnasium's tasks do when nothing clips.
         max_episode_steps: after which an episode is truncated.
         num_threads: of the physics; results do not depend on it.
-        render_mode: ``"rgb_array"`` or None. :class:`inbounds.robots.RobotRenderer` works with either.
+        render_mode: `"rgb_array"` or None. `inbounds.robots.RobotRenderer` works with either.
 
     Raises:
         ValueError: an argument is not one of those above.
@@ -97,7 +97,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         self._renderer: RobotRenderer | None = None
 
     def _make_spaces(self) -> None:
-        """Spaces and metadata, the same as Gymnasium's."""
+        """Make spaces and metadata, the same as Gymnasium's."""
         low, high = self.model.actuator_ctrlrange.astype(np.float32).T
         self._low, self._high = low, high
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
@@ -119,10 +119,10 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         Args:
             seed: an integer *s* seeds robot *i* with *s + i*; a sequence gives one seed each; None, alone or in a
                 sequence, goes on with the generator that is there (at first, one seeded by the system).
-            options: ``{"reset_mask": [N] booleans}`` resets some robots only; the others go on.
+            options: `{"reset_mask": [N] booleans}` resets some robots only; the others go on.
 
         Returns:
-            Observations ``[N, O]``, and whereabouts as Gymnasium reports them.
+            Observations `[N, O]`, and whereabouts as Gymnasium reports them.
 
         Raises:
             ValueError: the number of seeds, or the mask, does not fit.
@@ -145,13 +145,13 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         """Let every robot act once, and reset those whose episode ends.
 
         Args:
-            actions: ``[N, A]``, in the units of ``action_space``.
+            actions: `[N, A]`, in the units of `action_space`.
 
         Returns:
-            Observations ``[N, O]`` (of the new episode, where one ended), rewards ``[N]``, terminated ``[N]``,
-            truncated ``[N]``, and info: whereabouts, velocity [m/s] and the terms of the reward, each with its
-            mask; where episodes ended also ``final_obs`` and ``final_info``. The layout is
-            that of ``SyncVectorEnv`` with ``SAME_STEP``.
+            Observations `[N, O]` (of the new episode, where one ended), rewards `[N]`, terminated `[N]`,
+            truncated `[N]`, and info: whereabouts, velocity [m/s] and the terms of the reward, each with its
+            mask; where episodes ended also `final_obs` and `final_info`. The layout is
+            that of `SyncVectorEnv` with `SAME_STEP`.
 
         Raises:
             ValueError: actions of the wrong shape, or not finite.
@@ -184,7 +184,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         return self._obs.copy(), reward, terminated, truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """One frame of each robot, ``N × [240, 320, 3]``, if ``render_mode`` is ``"rgb_array"``; else None."""
+        """Return one frame of each robot, `N × [240, 320, 3]`, if `render_mode` is `"rgb_array"`; else None."""
         if self.render_mode is None:
             return None
         if self._renderer is None:
@@ -198,14 +198,14 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             self._renderer = None
 
     def get_data(self, robot: int) -> mujoco.MjData:
-        """A copy of one robot's simulation: its state, and derived quantities only where a task needs them."""
+        """Return a copy of one robot's simulation: its state, and derived quantities only where a task needs them."""
         return self._batch.get_data(robot)
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that the future depends on: arrays, and the generators' states as plain dictionaries.
+        """Return all that the future depends on: arrays, and the generators' states as plain dictionaries.
 
         Returns:
-            A dictionary for :meth:`set_state`; it can be pickled, and shares no memory with the environment.
+            A dictionary for `set_state`; it can be pickled, and shares no memory with the environment.
 
         Raises:
             gymnasium.error.ResetNeeded: before the first reset.
@@ -226,10 +226,10 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         """Go back to a state; what follows is, bit for bit, what followed it then.
 
         Args:
-            state: from :meth:`get_state` of an environment with the same task and number of robots.
+            state: from `get_state` of an environment with the same task and number of robots.
 
         Returns:
-            The observations ``[N, O]`` that belong to the state.
+            The observations `[N, O]` that belong to the state.
 
         Raises:
             ValueError: the state is of another task or number of robots.
@@ -259,7 +259,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         return tuple(self._seeds)
 
     def _chosen(self, options: dict[str, Any] | None) -> Flags:
-        """The robots that a reset is about."""
+        """Return the robots that a reset is about."""
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return self._everyone
@@ -273,7 +273,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         return mask
 
     def _executed(self, actions: Action) -> Action:
-        """The actions as the robots receive them, in the precision in which they came."""
+        """Return the actions as the robots receive them, in the precision in which they came."""
         actions = np.asarray(actions)
         if actions.shape != self.action_space.shape:
             raise ValueError(f"Actions must have the shape {self.action_space.shape}, got {actions.shape}")
