@@ -138,9 +138,7 @@ def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture
 def test_the_readme_quotes_what_was_measured() -> None:
     root = Path(report.__file__).resolve().parents[1]
     results = json.loads((root / "benchmarks" / "results" / "speed.json").read_text(encoding="utf8"))
-    (quoted,) = (
-        part for part in (root / "README.md").read_text(encoding="utf8").split("\n\n") if "How fast" in part
-    )
+    quoted = (root / "benchmarks" / "README.md").read_text(encoding="utf8")
     measured = {
         (bar.env.partition("-")[0], "TRPO" if "trpo" in bar.ours else "PPO"): f"{np.median(values):.1f}"
         for bar, values in report.bars(results)
