@@ -19,6 +19,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from inbounds.book.report import study_pages
+from inbounds.book.report.over_all_robots import over_all_robots
 from tests.study.second import independent
 from tests.study.second.independent_statistics import (
     bootstrap_difference,
@@ -247,6 +249,58 @@ def test_as_they_come_and_as_printed(arm: str, short: str, endpoint: str) -> Non
                     wide = over_all[(*contrast, robot)]
                     assert 0.03 < wide < 0.08 or (f"{robot}†" in told) == (wide >= 0.05), (text, wide)
     assert words >= len(mine)
+
+
+def unit_scores(algorithm: str, family: str, endpoint: str) -> list[np.ndarray]:
+    """Per robot: 0 the first epoch's mean return of PPO's Gaussian as it comes, 1 its mean final return."""
+    found = []
+    for robot in ROBOTS:
+        reference = seeds_of(f"standard-{robot.lower()}-ppo-gaussian")
+        zero, one = reference.returns[:, 0].mean(), reference.endpoint("final").mean()
+        (name,) = there(*(f"{arm}-{robot.lower()}-{algorithm}-{family}" for arm in ("standard", "beyond")))
+        found.append((seeds_of(name).endpoint(endpoint) - zero) / (one - zero))
+    return found
+
+
+def better(first: list[np.ndarray], second: list[np.ndarray]) -> float:
+    """How often a run of the first beats one of the second, pair by pair, ties by half; mean over robots."""
+    pairs = [
+        [np.sign(x - y) / 2 + 0.5 for x in one for y in other]
+        for one, other in zip(first, second, strict=True)
+    ]
+    return float(np.mean([np.mean(each) for each in pairs]))
+
+
+@pytest.mark.parametrize("endpoint", ENDPOINTS)
+def test_over_all_robots(endpoint: str) -> None:
+    """IQM of normalised scores and probability of improvement, as *All tables* prints them for standard practice."""
+    text = over_all_robots(study_pages.shipped(), "standard").html
+    figure = re.findall(r'alt="IQM of the normalised (.+?) over all robots \(.+?\)\. (.+?)"', text)
+    said = dict(figure)["final return" if endpoint == "final" else "area under the learning curve"]
+    families = {"Gaussian, clipped": "gaussian", "Beta": "beta", "Logit-normal": "logit-normal"}
+    compared = 0
+    for algorithm, row in re.findall(r"(PPO|TRPO): ([^:]+?)(?=\. TRPO|$)", said):
+        for label, number in re.findall(r"(Gaussian, clipped|Beta|Logit-normal) ([−\d.]+)", row):
+            runs = np.concatenate(unit_scores(algorithm.lower(), families[label], endpoint))
+            middle = np.sort(runs)[len(runs) // 4 : len(runs) - len(runs) // 4]
+            assert float(number) == pytest.approx(middle.mean(), abs=0.0501)
+            compared += 1
+    assert compared == 5
+    rows = re.findall(
+        r'words">(PPO|TRPO)</td>\s*<td class="words">([\w-]+) − ([\w-]+)</td>((?:\s*<td>.*?</td>)+)', text
+    )
+    assert len(rows) == 4
+    for algorithm, *names, cells in rows:
+        told = re.findall(r"<td>([\d.]+) \[([\d.]+), ([\d.]+)\]</td>", cells)[ENDPOINTS.index(endpoint)]
+        sides = [unit_scores(algorithm.lower(), name.lower(), endpoint) for name in names]
+        assert float(told[0]) == pytest.approx(better(*sides), abs=0.00501)
+        rng = np.random.default_rng(list(algorithm.encode()))
+        draws = [
+            better(*([rng.choice(each, len(each)) for each in side] for side in sides)) for _ in range(300)
+        ]
+        assert [float(end) for end in told[1:]] == pytest.approx(
+            np.quantile(draws, [0.025, 0.975]), abs=0.035
+        )
 
 
 def test_a_wrong_number_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
