@@ -33,6 +33,8 @@ ROOT = Path(__file__).resolve().parents[3]
 CELLS = ROOT / "results" / "cells"
 DRAWS = 40_000
 ENDPOINTS, ROBOTS = independent.ENDPOINTS, independent.ROBOTS
+LAST = {"second-done", "capg-trpo-area-half"}
+"""Glued last before a page's first view: by *Which policy?* and *What happened*, and by *Why*."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def printed(page: str) -> dict[str, Any]:
             continue
         exec(compile(cell.source, page, "exec"), names)
         names["glue"] = lambda name, value, display: glued.update({name: value})
-        if "second-done" in glued:  # the last that both of them glue before the first view
+        if LAST & glued.keys():
             break
     return names | {"glued": glued}
 
@@ -249,6 +251,55 @@ def test_as_they_come_and_as_printed(arm: str, short: str, endpoint: str) -> Non
                     wide = over_all[(*contrast, robot)]
                     assert 0.03 < wide < 0.08 or (f"{robot}†" in told) == (wide >= 0.05), (text, wide)
     assert words >= len(mine)
+
+
+def why_differences() -> Iterator[tuple[str, str, str, str]]:
+    """Glued name, first and second cell, endpoint of each difference that *Why* tells."""
+    for endpoint in ENDPOINTS:
+        area = "-area" if endpoint == "area" else ""
+        cheetah = "halfcheetah-trpo"
+        yield (
+            f"lead-cheetah{area}",
+            f"standard-{cheetah}-logit-normal",
+            f"standard-{cheetah}-gaussian",
+            endpoint,
+        )
+        quiet = (f"afterwards-{cheetah}-{family}-matched-noise" for family in ("logit-normal", "gaussian"))
+        yield f"left-cheetah{area}", *quiet, endpoint
+        for robot in ("HalfCheetah", "Ant"):
+            logit, gaussian = (f"standard-{robot.lower()}-trpo-{f}" for f in ("logit-normal", "gaussian"))
+            loud = f"afterwards-{robot.lower()}-trpo-logit-normal-loud-noise"
+            yield f"lost-{robot}-{endpoint}", logit, loud, endpoint
+            yield f"left-{robot}-{endpoint}", loud, gaussian, endpoint
+            yield f"lead-{robot}-{endpoint}", logit, gaussian, endpoint
+        for algorithm in ("ppo", "trpo"):
+            capg = f"beyond-halfcheetah-{algorithm}-clipped-gaussian"
+            yield f"capg-{algorithm}-{endpoint}", capg, f"standard-halfcheetah-{algorithm}-gaussian", endpoint
+    for arm, algorithm in (("mechanisms", "ppo"), ("afterwards", "trpo")):
+        plain = f"standard-halfcheetah-{algorithm}-gaussian"
+        yield (
+            f"quiet-cheetah-{algorithm}",
+            f"{arm}-halfcheetah-{algorithm}-gaussian-matched-noise",
+            plain,
+            "final",
+        )
+
+
+def test_why() -> None:
+    """Value and interval of each difference, as the three experiments print them; a verdict where that is all."""
+    glued = printed("why")["glued"]
+    verdicts = 0
+    for name, first, second, endpoint in why_differences():
+        mine = gap((first,), (second,), endpoint)
+        numbers = [float(each.replace("−", "-")) for each in re.findall(r"[−-]?\d+(?:\.\d+)?", glued[name])]
+        if "no difference found" in glued[name]:
+            assert mine.side == 0 or mine.near, (name, glued[name])
+            assert numbers == pytest.approx([mine.low, mine.high], abs=mine.error + 0.51), name
+            verdicts += 1
+            continue
+        assert numbers[0] == pytest.approx(mine.value, abs=0.51), name
+        assert numbers[1:3] == pytest.approx([mine.low, mine.high], abs=mine.error + 0.51), name
+    assert verdicts  # CAPG's differences are told in words
 
 
 def unit_scores(algorithm: str, family: str, endpoint: str) -> list[np.ndarray]:
