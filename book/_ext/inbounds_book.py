@@ -7,7 +7,7 @@
   loads one.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
-* A full stop behind a DOI stays with it (see ``keep_full_stops``).
+* A full stop behind a DOI or an address stays with it (see ``keep_full_stops``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
 * The theme that the system asks for is set before anything is drawn.
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
@@ -73,14 +73,14 @@ MENDED = {
 }
 
 
-LONELY = re.compile(r"(?<=doi:)([^<]*)([^<]{4})</a>\.")
+LONELY = re.compile(r"((?:doi:|https?://)[^<]*)([^<]{4})</a>\.")
 TOGETHER = r'\1<span style="white-space:nowrap">\2.</span></a>'
 
 
 def keep_full_stops(
     app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
-    """Keep the full stop behind a DOI with its last digits: both break anywhere, and it would stand on a line alone."""
+    """Keep the full stop behind a DOI or an address with its end: both break anywhere, and it would stand alone."""
     context["body"] = LONELY.sub(TOGETHER, context.get("body", ""))
 
 

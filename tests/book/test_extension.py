@@ -150,3 +150,6 @@ def test_a_full_stop_stays_with_its_doi(extension: ModuleType) -> None:
         '<a href="https://doi.org/10.1/123456">doi:10.1/12<span style="white-space:nowrap">3456.</span></a>'
         ' <a href="#">elsewhere</a>.'
     )
+    context["body"] = '<a href="https://a.org/1234567">https://a.org/1234567</a>.'
+    extension.keep_full_stops(None, "book/bibliography", "", context, None)
+    assert context["body"].endswith('a.org/123<span style="white-space:nowrap">4567.</span></a>')
