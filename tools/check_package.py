@@ -1,6 +1,6 @@
 """Build the wheel and the sdist, install one of them alone in a bare environment, and look at what a stranger gets.
 
-    python tools/check_package.py [--extra NAME] [--sdist]
+    python tools/check_package.py [--extra NAME] [--sdist] [--dist FOLDER]
 
 Bare is a virtual environment with the package, its dependencies, and those of one extra. Checked: the version, the
 marker of types, imports without a warning whose own time is below half a second, the README's snippet.
@@ -9,6 +9,7 @@ marker of types, imports without a warning whose own time is below half a second
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,9 +25,17 @@ ROOMS = (
     "inbounds.study",
     "inbounds.cli",
 )
+COMMANDS = ("", "train", "watch", "study", "doctor", "grade")
 MOST = 0.5
 """Seconds of processor time that the package's own modules may take in an import, others' not counted."""
-EXTRAS = {"fast": "numba", "video": "mediapy", "report": "jinja2", "integrations": "torchrl"}
+EXTRAS = {
+    "cluster": "distributed",
+    "fast": "numba",
+    "integrations": "torchrl",
+    "report": "jinja2",
+    "tensorboard": "tensorboard",
+    "video": "mediapy",
+}
 """Extra → a module that it brings."""
 
 
@@ -55,7 +64,9 @@ def snippet() -> str:
 
 def check(python: Path, folder: Path, extra: str) -> None:
     """Look at an installed package."""
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf8"))["project"]["version"]
+    (version,) = re.findall(
+        r'^__version__ = "([^"]+)"', (ROOT / "src/inbounds/__init__.py").read_text(), re.M
+    )
     assert run(str(python.with_name("inbounds")), "--version", folder=folder).strip() == f"inbounds {version}"
     where = "import inbounds, pathlib; print(pathlib.Path(inbounds.__file__).with_name('py.typed').exists())"
     assert run(str(python), "-c", where, folder=folder).strip() == "True"
@@ -65,6 +76,8 @@ def check(python: Path, folder: Path, extra: str) -> None:
         )
         print(f"import {room}: {took:.3f} s of its own")
         assert took < MOST
+    for command in COMMANDS:
+        run(str(python), "-W", "error", "-m", "inbounds", *command.split(), "--help", folder=folder)
     run(str(python), "-W", "error", "-c", snippet(), folder=folder)
     for name, module in EXTRAS.items():
         found = f"import importlib.util as u; print(u.find_spec({module!r}) is not None)"
@@ -77,6 +90,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--extra", default="", choices=["", *EXTRAS])
     parser.add_argument("--sdist", action="store_true", help="install from the sdist instead of the wheel")
+    parser.add_argument("--dist", type=Path, help="keep what was built there")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -98,6 +112,8 @@ def main() -> None:
         target = f"{built}[{options.extra}]" if options.extra else str(built)
         run(str(python), "-m", "pip", "install", "-q", target, folder=folder)
         check(python, folder, options.extra)
+        if options.dist:
+            shutil.copytree(folder / "dist", options.dist, dirs_exist_ok=True)
     print("a stranger gets what the README promises")
 
 

@@ -11,6 +11,6 @@ MuJoCo's off-screen backend, which has to happen before `mujoco` is imported for
 
 from inbounds.headless import choose_backend
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"  # the one place; CITATION.cff and CHANGELOG.md are held to it
 
 choose_backend()
