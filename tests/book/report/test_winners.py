@@ -60,6 +60,9 @@ def test_the_evidence_is_where_the_links_lead() -> None:
 def test_the_finding_follows_the_rows() -> None:
     rows = [row("beta", 4, 9), row("beta", -5, 5, robot="Hopper")]
     said = winners.finding(winners.by_test(["higher", "lower", ""]), rows, "beta", "ppo")
-    assert "as they come, above on 1 of 3 robots, below on 1 (found)" in said
-    assert "quiet start, above on 1 of 2 robots, below on 0, no difference found on 1 (found on 1)." in said
-    assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("start")[2]
+    assert said == (
+        "Under PPO the Beta ends above the clipped Gaussian on 1 of 3 robots, and below it on 1 (found). "
+        "When both start equally quiet, the Beta ends above on 1 of 2 robots, and below on none (found on 1)."
+    )
+    assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("quiet")[2]
+    assert "not compared yet" in winners.finding("x", [], "beta", "ppo")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import counted, graded, of, sign
+from inbounds.book.report.answers import graded, of, sign
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.study.grid import ROBOTS
@@ -73,34 +73,48 @@ def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
 
 
 def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: str) -> str:
-    """Return the book's finding in one sentence: what a law gains as it comes, and what from an equally quiet start.
+    """Return the book's finding in two sentences: what a law gains as it comes, and what from an equally quiet start.
 
     Args:
-        as_they_come: on how many robots the differences lie where, as `counted` says it, and how that was found.
+        as_they_come: on how many robots the law ends where, as `by_test` says it.
         rows: of `equal_start.laws`.
         law: the bounded one.
         algorithm: ppo or trpo.
 
     Example:
-        >>> finding("above on 4 of 6 robots", [], "beta", "ppo").partition(": ")[2]
-        'as they come, above on 4 of 6 robots; from an equally quiet start, not run yet.'
+        >>> finding("above the clipped Gaussian on 4 of 6 robots", [], "beta", "ppo").partition(". ")[0]
+        'Under PPO the Beta ends above the clipped Gaussian on 4 of 6 robots'
     """
     here = of(rows, law=law, algorithm=algorithm, endpoint="final")
-    grades = f" ({graded(here)})" if any(map(sign, here)) else ""
-    return (
-        f"Under {algorithm.upper()} the {NAMES[law]}, minus the clipped Gaussian: as they come, {as_they_come}; "
-        f"from an equally quiet start, {counted(here)}{grades}."
-    )
+    name = NAMES[law]
+    first = f"Under {algorithm.upper()} the {name} ends {as_they_come}."
+    if not here:
+        return f"{first} From an equally quiet start the two were not compared yet."
+    signs = [sign(row) for row in here]
+    grades = f" ({graded(here)})" if any(signs) else ""
+    above, below = _of(signs.count(1), len(here)), _none(signs.count(-1))
+    return f"{first} When both start equally quiet, the {name} ends above on {above}, and below on {below}{grades}."
 
 
 def by_test(words: Sequence[str]) -> str:
-    """Return on how many robots the first study's test finds what, from its verdicts.
+    """Return on how many robots the first study's test finds a law above and below, from its verdicts.
 
     Args:
         words: of `inbounds.study.words.verdict`, one a robot.
 
     Example:
         >>> by_test(["higher", "unresolved"])
-        'above on 1 of 2 robots, below on 0 (found)'
+        'above the clipped Gaussian on 1 of 2 robots, and below it on none (found)'
     """
-    return f"above on {words.count('higher')} of {len(words)} robots, below on {words.count('lower')} (found)"
+    above, below = _of(words.count("higher"), len(words)), _none(words.count("lower"))
+    return f"above the clipped Gaussian on {above}, and below it on {below} (found)"
+
+
+def _of(count: int, total: int) -> str:
+    """Return 4 of 6 robots."""
+    return f"{count} of {total} robot{'' if total == 1 else 's'}"
+
+
+def _none(count: int) -> str:
+    """Return a count, 0 as none."""
+    return str(count or "none")
