@@ -2,8 +2,8 @@
 
     python tools/rooms_picture.py
 
-What may be imported is said by ``tests/test_architecture.py``. An arrow that others imply is left out: a room may import
-whatever can be reached from it.
+What may be imported is said by ``tests/test_architecture.py``. An arrow that others imply is left out: a room may
+import whatever can be reached from it.
 """
 
 import sys
@@ -17,10 +17,10 @@ PLACES = {
     "cli": (12, 86, "the command"),
     "book": (164, 86, "what pages show"),
     "study": (316, 86, "the experiment"),
-    "learning": (468, 86, "how a policy changes"),
+    "learning": (468, 86, "what improves"),
     "integrations": (468, 14, "other libraries"),
-    "distributions": (636, 14, "what is drawn"),
-    "robots": (636, 158, "what executes it"),
+    "distributions": (636, 14, "what draws actions"),
+    "robots": (636, 158, "what executes them"),
 }
 """Room → left, top, and what it is for."""
 STYLE = """

@@ -3,7 +3,7 @@
 | Library           | Module                                    | What it gives                                      |
 |-------------------|-------------------------------------------|----------------------------------------------------|
 | stable-baselines3 | `inbounds.integrations.stable_baselines3` | `LogitNormalPolicy`, `quiet_start`: PPO, A2C, TRPO   |
-| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, for `LogitNormal` and `ScaledBeta`  |
+| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, `quiet_actor`: logit-normal, Beta   |
 | either, or none   | `inbounds.integrations.quiet`             | `quiet_scale`, the σ of a start with little noise    |
 
 Both keep the rule of the book: the library stores, and scores, the *latent*; the action is made from it on the way

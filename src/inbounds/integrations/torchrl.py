@@ -9,8 +9,7 @@ environment:
     loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
     batch = env.rollout(1000, acting)       # writes both, and "action"
 
-A quiet start is the extractor's first scale: with σ = `inbounds.integrations.quiet.quiet_scale(LogitNormal, 0.4)`, end
-the network in `NormalParamExtractor(scale_mapping=f"biased_softplus_{σ}")`.
+`quiet_actor` makes the two with a quiet start: centred in the box, with as much executed noise as is asked for.
 
 Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: a
 NaN, or an action beyond its bounds, then raises nothing. `torch.distributions.Distribution.set_default_validate_args`
@@ -19,6 +18,7 @@ switches them on again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -29,14 +29,15 @@ from torch.distributions import Distribution, constraints, kl_divergence, regist
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.distributions.bounds import TensorLike, require_bounds
+from inbounds.integrations.quiet import quiet_scale
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
-    from torchrl.modules import ProbabilisticActor
+    from torchrl.modules import NormalParamExtractor, ProbabilisticActor
 except ImportError as error:
     raise ImportError('TorchRL is not installed: pip install ".[integrations]" in the source tree') from error
 
-__all__ = ["PARAMETERS", "Latents", "bounded_actor"]
+__all__ = ["PARAMETERS", "Latents", "bounded_actor", "quiet_actor"]
 
 PARAMETERS: Mapping[type[LogitNormal | ScaledBeta], tuple[str, str]] = MappingProxyType(
     {LogitNormal: ("loc", "scale"), ScaledBeta: ("concentration1", "concentration0")}
@@ -150,3 +151,70 @@ def bounded_actor(
     return actor, TensorDictSequential(
         actor, TensorDictModule(action, in_keys=["latent"], out_keys=["action"])
     )
+
+
+class _BetaHead(nn.Module):
+    """Outputs `[..., 2A]` to α and β `[..., A]` above one: no mode on a bound; both are `start` where outputs are 0."""
+
+    def __init__(self, start: float) -> None:
+        super().__init__()
+        self.shift = math.log(math.expm1(start - 1))
+
+    def forward(self, outputs: Tensor) -> tuple[Tensor, ...]:
+        return tuple((1 + nn.functional.softplus(outputs + self.shift)).chunk(2, dim=-1))
+
+
+def quiet_actor(
+    body: nn.Module,
+    features: int,
+    law: type[LogitNormal | ScaledBeta],
+    low: TensorLike,
+    high: TensorLike,
+    std: float = 0.4,
+    in_keys: Sequence[str] = ("observation",),
+) -> tuple[ProbabilisticActor, TensorDictSequential]:
+    """Return `bounded_actor` on a body, with a last layer that starts quietly, as *Which policy?* recommends.
+
+    Untrained, the policy is centred in its box and executes the standard deviation std. For deterministic actions, call
+    it below `set_exploration_type(ExplorationType.DETERMINISTIC)`: the median of a logit-normal, the mean of a Beta.
+
+    Args:
+        body: from what is under `in_keys` to features `[..., F]`.
+        features: F.
+        law: `LogitNormal` or `ScaledBeta`.
+        low: `[A]` lower bounds of the action, in its own units.
+        high: `[A]` upper bounds.
+        std: of the executed action, in units of half the action range.
+        in_keys: what the body reads.
+
+    Returns:
+        The actor for the loss and the one that acts; see `bounded_actor`.
+
+    Raises:
+        ValueError: another law, bounds that `bounded_actor` refuses, or a std out of reach. A Beta with both parameters
+            above one executes less than 0.577.
+
+    Example:
+        >>> from tensordict import TensorDict
+        >>> body = nn.Sequential(nn.Linear(3, 64), nn.Tanh())
+        >>> actor, acting = quiet_actor(body, 64, ScaledBeta, [0.0, -2.0], [8.0, 1.0])
+        >>> batch = acting(TensorDict(observation=torch.zeros(1, 3), batch_size=[1]))
+        >>> round(batch["concentration1"].mean().item(), 1)
+        2.6
+    """
+    if law not in PARAMETERS:
+        raise ValueError(f"quiet_actor knows the laws LogitNormal and ScaledBeta, not {law}")
+    if law is ScaledBeta:
+        if not 0 < std < 3**-0.5:
+            raise ValueError(
+                f"std={std} is out of reach: a Beta without modes on its bounds executes less than 0.577"
+            )
+        head: nn.Module = _BetaHead(
+            (std**-2 - 1) / 2
+        )  # the standard deviation is 1/√(2α + 1) of half the range
+    else:
+        head = NormalParamExtractor(scale_mapping=f"biased_softplus_{quiet_scale(LogitNormal, std)}")
+    last = nn.Linear(features, 2 * require_bounds(low, high)[0].numel())
+    nn.init.orthogonal_(last.weight, gain=0.01)
+    nn.init.zeros_(last.bias)
+    return bounded_actor(nn.Sequential(body, last, head), law, low, high, in_keys)
