@@ -8,7 +8,8 @@ Jupyter Book caches executed notebooks by their cells alone. A chapter also depe
 pinned versions, so the cache lives in a folder named by a digest of those: change one and every notebook runs again.
 Jupyter Book executes one notebook after another. So what the cache lacks is executed beforehand, several at a time.
 
-The live robot needs packages from npm. Where npm cannot be reached the book has films in its place, and the next run
+Formulas are set once the pages stand, and the live robot is added. Both need packages from npm. Where npm cannot be
+reached MathJax sets the formulas in the reader's browser, and the book has films in the robot's place; the next run
 tries again.
 """
 
@@ -118,6 +119,21 @@ def build(code: str) -> int:
     ).returncode
 
 
+def finish() -> str:
+    """Do what the pages want once they stand; return what npm would have brought, and why it did not, or nothing."""
+    sys.path.insert(0, str(ROOT / "src"))
+    from inbounds.book import formulas  # not above: it takes seconds, and mostly nothing changed
+
+    lines = []
+    if why := formulas.write(INDEX.parent):
+        lines.append(
+            f"The formulas: MathJax sets them in the browser. {why}. The next `make book` tries again."
+        )
+    if why := add_live_robot():
+        lines.append(f"The live robot: films only. {why}. The next `make book` tries again.")
+    return "\n".join(lines)
+
+
 def add_live_robot() -> str:
     """Put the live robot's files into the built book; return why there are only films, or nothing."""
     sys.path.insert(0, str(ROOT / "src"))
@@ -131,10 +147,10 @@ def add_live_robot() -> str:
 
 
 def stamp(everything: str, why: str) -> None:
-    """Note what the book was built from; what lacks the live robot is not up to date."""
-    STAMP.write_text(everything if not why else f"{everything} films only")
+    """Note what the book was built from; what lacks something of npm's is not up to date."""
+    STAMP.write_text(everything if not why else f"{everything} without npm")
     if why:
-        print(f"The live robot: films only. {why}. The next `make book` tries again.")
+        print(why)
 
 
 def zip_book() -> Path:
@@ -162,9 +178,9 @@ def main() -> int:
     built_from = STAMP.read_text() if INDEX.exists() and STAMP.exists() else ""
     if built_from == everything:
         print("The book is up to date.")
-    elif built_from == f"{everything} films only":
-        print("The book is up to date, but for the live robot.")
-        stamp(everything, add_live_robot())
+    elif built_from == f"{everything} without npm":
+        print("The book is up to date, but for what npm brings.")
+        stamp(everything, finish())
     else:
         print("Executing the notebooks and building the pages ...", flush=True)
         if status := build(code):
@@ -176,7 +192,7 @@ def main() -> int:
         import student_copies  # not above: it takes a second, and mostly nothing changed
 
         student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
-        stamp(everything, add_live_robot())
+        stamp(everything, finish())
         print(f"Built in {time.perf_counter() - start:.0f} s.")
     if args.zip:
         print(f"Zipped: {zip_book()}")

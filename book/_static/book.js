@@ -2,7 +2,8 @@
 (() => {
   "use strict";
 
-  /* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space behind them. */
+  /* Where formulas are set in the browser: TeX breaks one in a line of text after a relation or an operator. MathJax 3 does not; it
+     marks both by the space behind them. (Those that are set beforehand have their breaks: formulas/js/set.entry.js.) */
   const OPERATOR = "mjx-container:not([display]) > mjx-math > :is(mjx-mo, mjx-texatom) + :is([space='3'], [space='4'])";
   const allowBreaks = () => {
     for (const next of document.querySelectorAll(OPERATOR)) next.before(document.createElement("wbr"));
@@ -91,9 +92,35 @@
     }).observe(row);
   }
 
+  /* A formula that is copied is its TeX: whatever is selected of it, and all of it after a double click. */
+  addEventListener("dblclick", ({ target }) => {
+    const formula = target.closest?.("[data-tex]");
+    if (formula) getSelection().selectAllChildren(formula);
+  });
+  addEventListener("copy", (event) => {
+    const selection = getSelection();
+    if (!selection.rangeCount || selection.isCollapsed) return;
+    const range = selection.getRangeAt(0).cloneRange();
+    const around = (node) => (node.nodeType === Node.ELEMENT_NODE ? node : node.parentElement).closest("[data-tex]");
+    const [first, last] = [around(range.startContainer), around(range.endContainer)];
+    if (first) range.setStartBefore(first);
+    if (last) range.setEndAfter(last);
+    const box = document.body.appendChild(document.createElement("div"));
+    box.append(range.cloneContents());
+    const formulas = box.querySelectorAll("[data-tex]");
+    for (const each of formulas) each.textContent = each.matches("div") ? `$$${each.dataset.tex}$$` : `$${each.dataset.tex}$`;
+    const text = box.innerText;
+    box.remove();
+    if (!formulas.length) return;
+    event.clipboardData.setData("text/plain", text);
+    event.preventDefault();
+  });
+
   addEventListener("load", async () => {
-    await window.MathJax?.startup?.promise;
-    allowBreaks();
+    if (window.MathJax) {
+      await MathJax.startup?.promise;
+      allowBreaks();
+    }
     await document.fonts.ready;
     const scrollers = document.querySelectorAll(SCROLLERS);
     const sizes = new ResizeObserver((entries) => entries.forEach((entry) => update(entry.target)));

@@ -13,7 +13,7 @@ import yaml
 from docutils import nodes
 from docutils.utils import new_document
 
-from inbounds.book.live.packages import node
+from inbounds.book.npm import node
 from inbounds.book.pages.contents import contents
 from tests.book.test_extension import load
 

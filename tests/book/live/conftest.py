@@ -2,7 +2,8 @@
 
 import pytest
 
-from inbounds.book.live.packages import NpmError, bundle
+from inbounds.book.live.packages import bundle
+from inbounds.book.npm import NpmError
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(build_book, "digest", lambda *names: "same")
     monkeypatch.setattr("sys.argv", ["build_book.py"])
     build_book.INDEX.write_text("the book", encoding="utf8")
-    build_book.STAMP.write_text("same same films only", encoding="utf8")
+    build_book.STAMP.write_text("same same without npm", encoding="utf8")
     return tmp_path
 
 

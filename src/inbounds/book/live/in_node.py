@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from inbounds.book.live import export
-from inbounds.book.live.packages import bundle, node
+from inbounds.book.live.packages import bundle
 from inbounds.book.live.site import scripts
+from inbounds.book.npm import node
 from inbounds.study.grid import Cell
 from inbounds.study.store import StudyFolder
 

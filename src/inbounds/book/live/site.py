@@ -12,7 +12,8 @@ from importlib import metadata
 from pathlib import Path
 
 from inbounds.book.live import export
-from inbounds.book.live.packages import JS, NpmError, bundle
+from inbounds.book.live.packages import JS, bundle
+from inbounds.book.npm import NpmError
 
 NUMERICS = Path(__file__).parents[1] / "explorables" / "numerics.js"
 LARGEST = 20_000_000  # bytes of all policies together

@@ -1,0 +1,73 @@
+"""Formulas are set when the book is built."""
+
+from pathlib import Path
+
+import pytest
+
+from inbounds.book import formulas
+from inbounds.book.npm import NpmError
+
+INLINE = r'<span class="math notranslate nohighlight">\(a &lt; \E[b]\)</span>'
+NUMBER = '<span class="eqno">(1)<a class="headerlink" href="#eq">#</a></span>'
+DISPLAY = rf'<div class="math notranslate nohighlight" id="eq">{chr(10)}{NUMBER}\[\frac{{a}}{{b}} = \{{ c \}}\]</div>'
+PAGE = f"""<html><head>
+<script>window.MathJax = {{"tex": {{"macros": {{"E": "\\\\mathbb{{E}}"}}}}}}</script>
+<script defer="defer" src="../_static/mathjax/tex-chtml.js"></script>
+</head><body>{INLINE}{DISPLAY}</body></html>"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A built book of one page, with MathJax beside it."""
+    (tmp_path / "_static" / formulas.FONTS).mkdir(parents=True)
+    (tmp_path / "_static" / formulas.FONTS / "a.woff").touch()
+    (tmp_path / "_static" / "mathjax" / "tex-chtml.js").touch()
+    (tmp_path / "notebooks").mkdir()
+    (tmp_path / "notebooks" / "page.html").write_text(PAGE, encoding="utf8")
+    return tmp_path
+
+
+def test_tex_is_found_in_lines_and_alone() -> None:
+    assert formulas.formulas(PAGE) == [(r"a < \E[b]", False), (r"\frac{a}{b} = \{ c \}", True)]
+
+
+def test_a_page_has_its_formulas_and_no_script(folder: Path) -> None:
+    if why := formulas.write(folder):
+        pytest.skip(f"formulas are not set here: {why}")
+    page = (folder / "notebooks" / "page.html").read_text(encoding="utf8")
+    assert page.count("<mjx-container") == 2
+    assert "<mi>a</mi><mo>&lt;</mo>" in page  # for screen readers
+    assert 'data-tex="a &lt; \\E[b]"' in page  # for who copies it
+    assert NUMBER in page
+    assert "<wbr>" in page.partition(NUMBER)[0]
+    assert "<script" not in page
+    assert page.index("../_static/formulas.css?v=") < page.index("</head>")
+    assert [path.name for path in (folder / "_static").rglob("*.*")] == ["formulas.css", "a.woff"]
+    styles = (folder / "_static" / "formulas.css").read_text(encoding="utf8")
+    for glyph in ("1D44E.TEX-I", "7B", "5B", "1D53C.TEX-A"):  # a { [ E: a brace is one in the sheet, too
+        assert f".mjx-c{glyph}::before {{" in styles
+    assert ".mjx-c1D467" not in styles  # no z
+    before = page
+    assert formulas.write(folder) == ""  # set once
+    assert (folder / "notebooks" / "page.html").read_text(encoding="utf8") == before
+
+
+def test_a_formula_that_is_wrong_stops_the_build(folder: Path) -> None:
+    path = folder / "notebooks" / "page.html"
+    path.write_text(PAGE.replace(r"\E[b]", r"\unheard{b}"), encoding="utf8")
+    try:
+        formulas.set_all([("a", False)], {})
+    except NpmError as error:
+        pytest.skip(f"formulas are not set here: {error}")
+    with pytest.raises(ValueError, match=r"notebooks/page.html: Undefined control sequence \\unheard"):
+        formulas.write(folder)
+
+
+def test_without_npm_the_pages_stay_as_they_are(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unreachable(*_: object) -> Path:
+        raise NpmError("npm could not bring the packages: no network")
+
+    monkeypatch.setattr(formulas, "made_once", unreachable)
+    assert formulas.write(folder) == "npm could not bring the packages: no network"
+    assert (folder / "notebooks" / "page.html").read_text(encoding="utf8") == PAGE
+    assert (folder / "_static" / "mathjax" / "tex-chtml.js").exists()
