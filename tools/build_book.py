@@ -122,13 +122,14 @@ def build(code: str) -> int:
 def finish() -> str:
     """Do what the pages want once they stand; return what npm would have brought, and why it did not, or nothing."""
     sys.path.insert(0, str(ROOT / "src"))
-    from inbounds.book import formulas  # not above: it takes seconds, and mostly nothing changed
+    from inbounds.book import formulas, previews  # not above: it takes seconds, and mostly nothing changed
 
     lines = []
     if why := formulas.write(INDEX.parent):
         lines.append(
             f"The formulas: MathJax sets them in the browser. {why}. The next `make book` tries again."
         )
+    previews.write(INDEX.parent)
     if why := add_live_robot():
         lines.append(f"The live robot: films only. {why}. The next `make book` tries again.")
     return "\n".join(lines)

@@ -1,0 +1,61 @@
+"""What a link leads to is shown beside it, and nothing is loaded for it before."""
+
+import re
+
+import pytest
+from playwright.sync_api import BrowserContext, Page
+
+from tests.pages import browser as book
+
+KINDS = {"statement": "thm-", "equation": "equation-", "source": "bibliography.html#id"}
+APART = """() => {
+  const [a, b] = ['[aria-describedby=inbounds-preview]', '#inbounds-preview'].map((one) => document.querySelector(one))
+    .map((node) => node.getBoundingClientRect());
+  return b.top >= a.bottom || b.bottom <= a.top || b.left >= a.right || b.right <= a.left;
+}"""
+
+
+def opened(context: BrowserContext, start: str, kind: str) -> Page:
+    """A page with a link of this kind, and the link in sight."""
+    part = KINDS[kind]
+    written = re.compile(rf'<a class="reference internal" href="[^"]*{part}')
+    names = [
+        name for name in book.pages(part) if written.search((book.HTML / name).read_text(encoding="utf-8"))
+    ]
+    page = context.new_page()
+    for name in names:
+        page.goto(start + name)
+        links = page.locator(f'article a.reference.internal[href*="{part}"]:visible')
+        if links.count():
+            links.first.scroll_into_view_if_needed()
+            links.first.evaluate("node => { node.dataset.tried = ''; }")
+            return page
+    raise AssertionError(f"no link to a {kind}")
+
+
+@pytest.mark.parametrize("scheme", ["http", "file"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_pointer_that_rests_sees_it(context: BrowserContext, address: str, scheme: str, kind: str) -> None:
+    page = opened(context, address if scheme == "http" else f"{book.HTML.as_uri()}/", kind)
+    assert not page.locator("script[src$='.html.js']").count()
+    page.locator("[data-tried]").hover()
+    preview = page.locator("#inbounds-preview")
+    preview.wait_for()
+    assert preview.inner_text().strip()
+    assert page.evaluate(APART)
+    preview.hover()
+    page.wait_for_timeout(500)
+    assert preview.is_visible()
+    page.keyboard.press("Escape")
+    assert preview.is_hidden()
+    assert page.locator("[aria-describedby=inbounds-preview]").count() == 0
+
+
+def test_a_focused_link_has_it_too(context: BrowserContext, address: str) -> None:
+    page = opened(context, address, "statement")
+    page.keyboard.press("Tab")
+    page.locator("[data-tried]").focus()
+    page.locator("#inbounds-preview[role=tooltip]").wait_for()
+    assert page.evaluate("document.activeElement.getAttribute('aria-describedby')") == "inbounds-preview"
+    page.keyboard.press("Tab")
+    page.wait_for_function("() => !document.querySelector('[data-tried]').hasAttribute('aria-describedby')")
