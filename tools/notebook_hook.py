@@ -18,6 +18,8 @@ import nbformat
 ROOT = Path(__file__).resolve().parents[1]
 QUOTED = re.compile(r"\{glue:?\w*\}`(?:([^`:]+\.ipynb)::)?([^`:]+)(?::([^`]*))?`")
 """The notebook, where it is another one, the name and the format in a glue role of MyST."""
+TRUTH = re.compile(r"^:truth: *(\S+)$", re.M)
+"""The name of the number that a guess is compared with (`book/_ext/guesses.py`)."""
 LIGHT = ("text/plain", "application/papermill.record/text/plain")
 METADATA = {
     "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
@@ -95,6 +97,9 @@ def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
     """Return what the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
     known, found = {"": glued(notebook)}, []
     for number, cell in enumerate(notebook.cells):
+        for name in TRUTH.findall(cell.source) if cell.cell_type == "markdown" else ():
+            if name not in known[""]:
+                found.append(f"cell {number}: has a guess at {name!r}, which no cell glues")
         for other, name, how in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
             if other not in known:
                 known[other] = glued(nbformat.read(ROOT / "notebooks" / other, 4))

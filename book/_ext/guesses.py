@@ -12,7 +12,7 @@ a truth that no cell glues, is an error of the build.
 
 import re
 import zlib
-from typing import Any
+from typing import Any, ClassVar
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -26,7 +26,9 @@ GUESS = 'class="inbounds-guess"'
 OPTION = re.compile(r"\(([a-z])\) +(?=\S)")
 KEY = re.compile(r"\(([a-z](?:, [a-z])*)\)")
 WITHIN = re.compile(r"x?\d+(?:\.\d+)?")
-TOLD = re.compile(r"'?([−-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?)(%?)(?![\w.])")  # a number, or a text that begins with one
+TOLD = re.compile(
+    r"'?([−-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?)(%?)(?![\w.])"
+)  # a number, or a text that begins with one
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 SPACE = "\N{NARROW NO-BREAK SPACE}"
 CHECK = "Check my guess"
@@ -62,7 +64,7 @@ class Guess(SphinxDirective):
     """One question: its text, and its options or what its number is compared with."""
 
     has_content = True
-    option_spec = {
+    option_spec: ClassVar = {
         "truth": directives.unchanged_required,
         "within": directives.unchanged_required,
         "unit": directives.unchanged_required,
@@ -84,7 +86,9 @@ class Guess(SphinxDirective):
         """Return the question's element."""
         question = inside.children[0] if inside.children else None
         if not isinstance(question, nodes.paragraph):
-            raise ValueError("it begins with its question, one paragraph; what that needs stands before the directive")
+            raise ValueError(
+                "it begins with its question, one paragraph; what that needs stands before the directive"
+            )
         name = f"{self.env.docname.rpartition('/')[2]}-{zlib.crc32(inside.astext().encode()):08x}"
         legend = element("legend", *question.children)
         data = {"data_name": name}
@@ -101,7 +105,11 @@ class Guess(SphinxDirective):
         result = element("p", class_="guess-result", role="status")
         field = element("fieldset", legend, answer, result)
         return tagged(
-            "", field, tag="div", attributes={"class": "inbounds-guess", **hyphened(data | more)}, letters=letters
+            "",
+            field,
+            tag="div",
+            attributes={"class": "inbounds-guess", **hyphened(data | more)},
+            letters=letters,
         )
 
     def number(self) -> tuple[tagged, dict[str, str]]:
@@ -111,7 +119,9 @@ class Guess(SphinxDirective):
             raise ValueError(f":within: is a distance like 5, or a factor like x1.5, and not {within!r}")
         truth = self.truth() * (100 if unit == "%" else 1)
         if within.startswith("x") and (truth <= 0 or float(within[1:]) <= 1):
-            raise ValueError(f"a factor like {within} needs a truth above 0 ({truth:g}) and has to be above 1")
+            raise ValueError(
+                f"a factor like {within} needs a truth above 0 ({truth:g}) and has to be above 1"
+            )
         attributes = {"step": self.options.get("step", "any"), "inputmode": "decimal"}
         field = element("input", type="number", **attributes)
         children: list[nodes.Node] = [field]
@@ -129,7 +139,9 @@ class Guess(SphinxDirective):
         hint = element("span", nodes.Text(f"({near} counts as right)"), class_="guess-hint")
         number = element("label", label, children.pop(), nodes.Text(after))
         data = {"data_kind": "number", "data_truth": repr(truth), "data_within": within, "data_unit": unit}
-        return element("div", *children, number, hint, class_="guess-number"), data | {"data_shown": shown(truth)}
+        return element("div", *children, number, hint, class_="guess-number"), data | {
+            "data_shown": shown(truth)
+        }
 
     def truth(self) -> float:
         """Return the number that the notebook glues."""
@@ -169,7 +181,9 @@ def shown(number: float) -> str:
 def choices(found: list[nodes.Node], name: str, *, several: bool) -> tuple[str, tagged]:
     """Return the letters of a question's options, and the list of them."""
     if len(found) != 1 or not isinstance(found[0], nodes.bullet_list):
-        raise ValueError("behind the question comes one list of its options, `- (a) text`, or it has a :truth:")
+        raise ValueError(
+            "behind the question comes one list of its options, `- (a) text`, or it has a :truth:"
+        )
     letters, items = "", []
     for item in found[0].children:
         letter, paragraph = lettered(item)
@@ -200,7 +214,9 @@ def put_keys_in(app: Sphinx, doctree: nodes.document) -> None:
     """Give each question of a page its key and its reasons, and each box its button."""
     done = set()
     for box in doctree.findall(lambda node: isinstance(node, nodes.Element) and "predict" in node["classes"]):
-        guesses = [node for node in box.findall(tagged) if node["attributes"].get("class") == "inbounds-guess"]
+        guesses = [
+            node for node in box.findall(tagged) if node["attributes"].get("class") == "inbounds-guess"
+        ]
         if not guesses:
             continue
         done.update(map(id, guesses))
@@ -246,7 +262,9 @@ def key(number: int, guess: tagged, answer: nodes.Element) -> None:
         raise ValueError(f"answer {number} has {len(right)} right options: the question needs :several:")
     guess["attributes"]["data-right"] = right
     reasons = ""
-    for item in (item for node in answer.children if isinstance(node, nodes.bullet_list) for item in node.children):
+    for item in (
+        item for node in answer.children if isinstance(node, nodes.bullet_list) for item in node.children
+    ):
         letter, _ = lettered(item)
         if letter in reasons or letter not in guess["letters"]:
             raise ValueError(f"answer {number} gives a reason for ({letter}) twice, or it is no option")

@@ -27,6 +27,7 @@ CORE = (
 )
 DIFFICULTY = re.compile(r" \(\d+ min, (?:easy|medium|hard)\)$")
 BACK = re.compile(r"\A# [^\n]+\n+\*Going deeper, from \{doc\}`(?:[^`<]*<)?([\w-]+)>?`\.\*")
+KEY = re.compile(r"^(?:\d+\. )?\*\*\([a-z](?:, [a-z])*\)\*\*", re.M)
 SHOWS = re.compile(r"\b(?:show_films|figures\.show|study_pages\.films(?:_of)?)\(")
 
 
@@ -58,13 +59,24 @@ def core_lacks(path: Path) -> Iterator[str]:
     if known and len(re.findall(r"^[-*] ", known[1], re.M)) != 3:
         yield "three lines under What you will know"
     yield from teach_lacks(block(prose, "Teach it"))
-    if "{dropdown}" not in block(prose, "Predict"):
-        yield "an answer to Predict, in a {dropdown}"
+    yield from predict_lacks(block(prose, "Predict"))
     for title in re.findall(r"\{exercise-start\}[ \t]*(.*)$", prose, re.M):
         if not DIFFICULTY.search(title):
             yield f"minutes and difficulty of the exercise {title!r}: (10 min, easy)"
     if not shows_before_stating(cells_of(path)):
         yield "a film, a figure or an explorable before the first definition"
+
+
+def predict_lacks(box: str) -> Iterator[str]:
+    """What a Predict box lacks; whether keys and options fit one another, the build checks (`book/_ext/guesses.py`)."""
+    if "{dropdown}" not in box:
+        yield "an answer to Predict, in a {dropdown}"
+    guesses = re.findall(r"^(`{3,})\{guess\}$(.*?)^\1$", box, re.M | re.S)
+    if not guesses:
+        yield "a question in Predict that takes a guess, in a {guess}"
+    choices = sum(":truth:" not in guess for _, guess in guesses)
+    if len(KEY.findall(box)) < choices:
+        yield f"{choices} keys in the answer to Predict, like **(b)**"
 
 
 def teach_lacks(fold: str) -> Iterator[str]:

@@ -51,6 +51,8 @@ def changed(tmp_path: Path, change: Callable[[str], str]) -> Path:
         ("dropdown teach", "dropdown", "dropdown teach"),
         ("planned minutes", "minutes", "'planned minutes'"),
         ("```{dropdown} Answer", "```{note} Answer", "an answer to Predict"),
+        ("{guess}", "{note}", "takes a guess"),
+        ("**(b)**", "(b)", "1 keys in the answer"),
         (" (5 min, easy)", "", "minutes and difficulty"),
         (" (5 min, easy)", " (5 min, trivial)", "minutes and difficulty"),
         ("## Summary", "## Conclusion", "## Summary"),

@@ -63,7 +63,9 @@ def built(folder: Path, box: str, share: str = "0.553", kind: str = "predict") -
     page = nbformat.v4.new_markdown_cell(
         f"# A page\n\n````{{admonition}} Predict\n:class: {kind}\n\n{box}\n````"
     )
-    notebook = nbformat.v4.new_notebook(cells=[page, cell], metadata={"language_info": {"name": "python", "pygments_lexer": "ipython3"}})
+    notebook = nbformat.v4.new_notebook(
+        cells=[page, cell], metadata={"language_info": {"name": "python", "pygments_lexer": "ipython3"}}
+    )
     nbformat.write(notebook, folder / "index.ipynb")
     said = io.StringIO()
     settings = {
@@ -212,12 +214,19 @@ def test_a_guess_outside_a_box_is_an_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [(55.3, "55.3"), (0.0499, "0.05"), (7.0, "7"), (1234.5, "1\N{NARROW NO-BREAK SPACE}234"), (-3.14159, "−3.14"), (0.25, "0.25")],
+    [
+        (55.3, "55.3"),
+        (0.0499, "0.05"),
+        (7.0, "7"),
+        (1234.5, "1\N{NARROW NO-BREAK SPACE}234"),
+        (-3.14159, "−3.14"),
+        (0.25, "0.25"),
+    ],
 )
 def test_numbers_are_shown_with_three_digits(number: float, text: str) -> None:
     sys.path.insert(0, str(EXTENSIONS))
     try:
-        import guesses  # noqa: PLC0415  (an extension of the book: its folder is no package)
+        import guesses
     finally:
         sys.path.remove(str(EXTENSIONS))
     assert guesses.shown(number) == text

@@ -226,6 +226,18 @@ def test_the_hook_sees_a_name_that_is_glued_twice(tmp_path: Path, capsys: pytest
     assert "glues 'answer' 2 times" in capsys.readouterr().out
 
 
+def test_a_guess_at_what_no_cell_glues_is_noticed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    notebook = small_notebook(tmp_path)
+    quote(notebook.cells[1], "1.5")
+    notebook.cells[0].source = "# A page\n\n```{guess}\n:truth: answer\n:within: 1\n\nHow many?\n```"
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == 0, capsys.readouterr().out
+    notebook.cells[0].source = notebook.cells[0].source.replace("answer", "other")
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == 1
+    assert "has a guess at 'other'" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_a_broken_notebook_fails_the_build(tmp_path: Path) -> None:
     """Jupyter Book exits 0 over a failing notebook unless told otherwise; our configuration tells it."""

@@ -1,0 +1,106 @@
+"""Predict boxes take a guess, score it in words, remember it from page to page, and forget it when told to."""
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from tests.pages import browser as book
+
+PAGES = book.pages('class="inbounds-guess"')
+CHOICES = [name for name in PAGES if 'data-kind="choice"' in (book.HTML / name).read_text(encoding="utf8")]
+# Fills in every question of the page's first box, each right or each wrong.
+ANSWER = """right => {
+  const guesses = [...document.querySelectorAll('.predict .inbounds-guess')];
+  for (const guess of guesses) {
+    const { kind, right: key, truth, within } = guess.dataset;
+    if (kind === 'number') {
+      const far = within.startsWith('x') ? truth * within.slice(1) ** 3 : Number(truth) + 3 * within;
+      guess.querySelector('input[type=number]').value = right ? truth : far;
+    } else for (const input of guess.querySelectorAll('input')) {
+      if (key.includes(input.value) === right) input.click();
+    }
+  }
+  return guesses.length;
+}"""
+
+
+def answered(page: Page, *, right: bool) -> int:
+    """Answer the page's box, and check; how many questions that were."""
+    count: int = page.evaluate(ANSWER, right)
+    check = page.locator(".guess-check").first
+    check.focus()
+    page.keyboard.press("Enter")
+    return count
+
+
+def test_the_core_chapters_ask() -> None:
+    assert len(PAGES) >= 18
+
+
+@pytest.mark.parametrize("scheme", ["http", "file"])
+def test_guesses_are_scored_and_remembered(context: BrowserContext, address: str, scheme: str) -> None:
+    start = address if scheme == "http" else f"{book.HTML.as_uri()}/"
+    page = context.new_page()
+    page.goto(start + CHOICES[0])
+    first = answered(page, right=True)
+    results = page.locator(".guess-result")
+    assert all(text.startswith("Right") for text in results.all_inner_texts())
+    assert page.locator(".predict details").get_attribute("open") is not None
+    assert f"right in {first} of {first} guesses" in page.locator(".guess-tally").inner_text()
+    page.goto(start + CHOICES[1])
+    assert page.locator(".guess-tally").inner_text() == ""
+    second = answered(page, right=False)
+    told = page.locator(".guess-result").all_inner_texts()
+    assert all(text.startswith(("Not so", "Off")) for text in told)
+    assert f"right in {first} of {first + second} guesses" in page.locator(".guess-tally").inner_text()
+    page.reload()
+    assert page.locator(".guess-result").all_inner_texts() == told
+    assert page.locator(".inbounds-guess input:enabled").count() == 0
+    page.get_by_role("button", name="Forget all my guesses").click()
+    assert page.locator(".guess-tally").inner_text() == "Forgotten."
+    page.goto(start + CHOICES[0])
+    assert all(text == "" for text in page.locator(".guess-result").all_inner_texts())
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_box_can_be_answered_right_and_wrong(context: BrowserContext, address: str, name: str) -> None:
+    page = context.new_page()
+    page.goto(address + name)
+    page.locator(".guess-check").first.click()
+    assert "No guess yet." in page.locator(".guess-result").all_inner_texts()
+    answered(page, right=True)
+    assert all(text.startswith("Right") for text in page.locator(".guess-result").all_inner_texts())
+    page.locator(".guess-check").first.click()  # again
+    answered(page, right=False)
+    assert all(text.startswith(("Not so", "Off")) for text in page.locator(".guess-result").all_inner_texts())
+
+
+def test_a_wrong_choice_is_told_why(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.goto(address + next(name for name in CHOICES if "boundary_effect" in name))
+    answered(page, right=False)
+    told = page.locator(".guess-result").first
+    assert "right is (b)" in told.inner_text()
+    assert len(told.inner_text()) > len(told.locator("strong").inner_text()) + 20
+
+
+def test_a_browser_that_keeps_nothing_still_scores(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    failed: list[str] = []
+    page.on("pageerror", lambda error: failed.append(str(error)))
+    page.add_init_script("Object.defineProperty(window, 'localStorage', { get() { throw new Error('no') } })")
+    page.goto(address + CHOICES[0])
+    answered(page, right=True)
+    assert page.locator(".guess-result").first.inner_text().startswith("Right")
+    assert not [error for error in failed if "guesses" in error]
+
+
+def test_without_scripts_a_box_is_question_options_and_answer(browser: Browser, address: str) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(address + CHOICES[0])
+    assert page.locator(".inbounds-guess legend").first.is_visible()
+    assert page.locator(".guess-options li").first.is_visible()
+    assert page.locator(".inbounds-guess input:visible, .guess-check:visible").count() == 0
+    page.locator(".predict details summary").click()
+    assert page.locator(".predict details").get_attribute("open") is not None
+    context.close()
