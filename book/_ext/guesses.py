@@ -23,7 +23,7 @@ from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 GUESS = 'class="inbounds-guess"'
-OPTION = re.compile(r"\(([a-z])\) +(?=\S)")
+OPTION = re.compile(r"\(([a-z])\) +")
 KEY = re.compile(r"\(([a-z](?:, [a-z])*)\)")
 WITHIN = re.compile(r"x?\d+(?:\.\d+)?")
 TOLD = re.compile(

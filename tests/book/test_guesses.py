@@ -20,7 +20,7 @@ Is $x$ **more** or less?
 
 - (a) more, $x > 1$
 - (b) less
-- (c) as before
+- (c) $x = 1$
 ```
 """
 NUMBER = """```{guess}
@@ -175,7 +175,7 @@ def instead(text: str, other: str) -> Callable[[str], str]:
         (instead("{dropdown} Answer", "{note}"), "in one {dropdown}"),
         (instead("- (b) less\n", "- (d) less\n"), "in order, two at least, and not a, d, c"),
         (instead("- (b) less\n", "- less\n"), "does not begin with a letter"),
-        (without("- (a) more, $x > 1$\n- (b) less\n- (c) as before\n"), "one list of its options"),
+        (without("- (a) more, $x > 1$\n- (b) less\n- (c) $x = 1$\n"), "one list of its options"),
         (instead(":truth: share", ":truth: shore"), "no cell glues its :truth:, 'shore'"),
         (instead(":range: 0 100", ":range: 60 100"), "55.3, lies outside its :range:"),
         (instead(":range: 0 100", ":range: 100 0"), ":range: is two numbers"),
