@@ -3,4 +3,7 @@
 `choices` writes what every choice shows, `element` puts it on a page, `explorer.js` draws it. Nothing is computed in
 the browser but places of points: each number and each verdict is written here, by the functions that make the static
 pages.
+
+`picked_seeds` is another: tick a few seeds a side and see what you would have published. It computes, in
+`picked_seeds.js`, and is tested against Python.
 """

@@ -126,11 +126,21 @@ def style_sheet() -> str:
         >>> "--explorer-beta: #1F8277" in style_sheet()
         True
     """
+    return "\n".join(
+        [variables(".inbounds-study-explorer"), SCRIPT.with_suffix(".css").read_text(encoding="utf-8")]
+    )
+
+
+def variables(selector: str) -> str:
+    """Return the colours of text, lines and families as variables of an element, for both themes.
+
+    Example:
+        >>> variables(".a").count("--explorer-beta:")
+        2
+    """
     blocks = []
-    for theme, selector in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
+    for theme, scope in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
         families = {n: look.color if theme == "light" else look.color_on_dark for n, look in LOOKS.items()}
-        variables = " ".join(
-            f"--explorer-{key}: {value};" for key, value in (_COLORS[theme] | families).items()
-        )
-        blocks.append(f"{selector}.inbounds-study-explorer {{ {variables} }}")
-    return "\n".join([*blocks, SCRIPT.with_suffix(".css").read_text(encoding="utf-8")])
+        colors = " ".join(f"--explorer-{key}: {value};" for key, value in (_COLORS[theme] | families).items())
+        blocks.append(f"{scope}{selector} {{ {colors} }}")
+    return "\n".join(blocks)
