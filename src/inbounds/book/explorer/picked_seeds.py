@@ -187,7 +187,8 @@ def _place(row: Compared) -> tuple[str, str, tuple[str, str]]:
 
 def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
     """Return the differences of all reports as a picture, and their shares in words."""
-    every = reports(*(side[np.isfinite(side)] for side in sides))
+    first, second = (side[np.isfinite(side)] for side in sides)
+    every = reports(first, second)
     names = [SHORT[family] for family in row.contrast[2:]]
     with figures.use_style():
         fig, ax = plt.subplots(figsize=(figures.WIDTH, 2.8))
