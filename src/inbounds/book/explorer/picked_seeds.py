@@ -89,7 +89,7 @@ def reports(first: ArrayLike, second: ArrayLike, picked: tuple[int, int] = (TICK
     Example:
         >>> every = reports(range(10), range(10))
         >>> every.value.shape, round(every.shares()["interval"]["nothing"], 2)
-        ((120, 120), 0.96)
+        ((120, 120), 0.98)
     """
     if min(picked) < 2:
         raise ValueError(f"{picked} seeds: an interval needs at least two a side")
