@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 NB ?= $(wildcard notebooks/*.ipynb)
 PORT ?= 8000
 
-.PHONY: help setup book quick test check format notebooks pages serve lab bench dist clean distclean
+.PHONY: help setup book quick test check format notebooks pages pdf slides serve lab bench dist clean distclean
 
 help:  ## list these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -39,6 +39,13 @@ notebooks: setup  ## execute notebooks and store their text outputs  (NB=noteboo
 pages: book  ## open every built page in headless Chromium and check it
 	@tools/setup.sh --with-browser
 	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
+
+pdf: book  ## print the whole book into one PDF, _build/pdf/in-bounds.pdf
+	@tools/setup.sh --with-browser
+	@$(PY) tools/print_book.py
+
+slides: book  ## a deck of key statements and figures for each core chapter, in _build/slides
+	@$(PY) tools/slides.py
 
 serve: book  ## preview the built book on this machine  (PORT=8000)
 	@echo "Serving on http://127.0.0.1:$(PORT)/ (Ctrl-C ends it)"

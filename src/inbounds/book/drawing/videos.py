@@ -13,6 +13,8 @@ from __future__ import annotations
 import base64
 import itertools
 import os
+import subprocess
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -214,6 +216,34 @@ def _encode(film: Film, quantiser: int) -> bytes:
 def _poster(frame: NDArray[np.uint8]) -> bytes:
     data: bytes = _mediapy().compress_image(frame, fmt="jpeg", quality=60)
     return data
+
+
+def stills(film: bytes, count: int = 3) -> list[bytes]:
+    """Return frames of a film as JPEG pictures, from its first to its last at equal distances: a film on paper.
+
+    Args:
+        film: an MP4 file's content.
+        count: of frames, at least two.
+
+    Raises:
+        RuntimeError: mediapy or ffmpeg is missing; the message names the fix.
+
+    Example:
+        >>> frames = [np.full((32, 32, 3), value, np.uint8) for value in (0, 128, 255)]
+        >>> len(stills(_mediapy().compress_video(frames, fps=10), 2))
+        2
+    """
+    _mediapy()
+    import imageio_ffmpeg
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "film.mp4")
+        file.write_bytes(film)
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(file), "-q:v", "4"]
+        subprocess.run([*command, str(Path(folder, "%05d.jpg"))], check=True, stdin=subprocess.DEVNULL)
+        frames = sorted(Path(folder).glob("*.jpg"))
+        chosen = np.linspace(0, len(frames) - 1, count).round().astype(int)
+        return [frames[i].read_bytes() for i in chosen]
 
 
 def require_encoder() -> None:
