@@ -95,7 +95,7 @@ def print_book(html: Path, names: Sequence[str], out: Path, *, keep: bool = Fals
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     document = (
-        html / "notebooks" / "whole-book-for-print.html"
+        html / "notebooks" / "whole-book-for-print.htm"
     )  # a neighbour of the pages: their links to pictures hold
     try:
         start: dict[str, int] = {}

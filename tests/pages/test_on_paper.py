@@ -44,12 +44,12 @@ def test_a_print_has_numbers_an_outline_and_tags(tool: object, tmp_path: Path) -
     for name, number in first.items():
         assert str(number) in contents
         assert str(number) in reader.pages[number - 1].extract_text(), name
-    assert not (books.HTML / "notebooks" / "whole-book-for-print.html").exists()
+    assert not (books.HTML / "notebooks" / "whole-book-for-print.htm").exists()
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_wider_than_the_paper(tool: object, name: str, browser: Browser, tmp_path: Path) -> None:
-    document = books.HTML / "notebooks" / f"print-of-{name.rpartition('/')[2]}.html"
+    document = books.HTML / "notebooks" / f"print-of-{name.rpartition('/')[2]}.htm"
     document.write_text(tool.one_document.join(books.HTML, [name], {}), encoding="utf8")
     try:
         page = browser.new_page(viewport=tool.PAPER)
