@@ -10,10 +10,12 @@ its frames, an explorable its picture, and what is too wide for the paper is mad
 """
 
 import argparse
+import contextlib
 import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import one_document
 
@@ -40,14 +42,14 @@ SETTLED = """async () => {
 MINUTES = 10
 
 
-def print_once(document: Path, out: Path) -> None:
-    """Let Chromium print a document; tagged, with an outline of its headings."""
+def print_once(document: Path, out: Path, browser: Any = None) -> None:
+    """Let Chromium, or a browser that runs already, print a document; tagged, with an outline of its headings."""
     sys.path.insert(0, str(ROOT))
     from tests.pages.browser import chromium  # the browser of the page tests
 
     limit = MINUTES * 60_000
-    with chromium() as browser:
-        page = browser.new_page(viewport=PAPER, color_scheme="light")
+    with contextlib.nullcontext(browser) if browser else chromium() as running:
+        page = running.new_page(viewport=PAPER, color_scheme="light")
         page.set_default_timeout(limit)
         page.emulate_media(media="print")
         page.goto(document.as_uri(), wait_until="load", timeout=limit)
@@ -64,6 +66,7 @@ def print_once(document: Path, out: Path) -> None:
             tagged=True,
             outline=True,
         )
+        page.close()
 
 
 def page_numbers(pdf: Path, names: Sequence[str]) -> dict[str, int]:
@@ -81,7 +84,9 @@ def page_numbers(pdf: Path, names: Sequence[str]) -> dict[str, int]:
     return found
 
 
-def print_book(html: Path, names: Sequence[str], out: Path, *, keep: bool = False) -> Mapping[str, int]:
+def print_book(
+    html: Path, names: Sequence[str], out: Path, *, keep: bool = False, browser: Any = None
+) -> Mapping[str, int]:
     """Print pages of a built book into one PDF.
 
     Args:
@@ -89,6 +94,7 @@ def print_book(html: Path, names: Sequence[str], out: Path, *, keep: bool = Fals
         names: of the pages, in the order of the print.
         out: the PDF.
         keep: keep the document that was printed.
+        browser: Playwright's, if one runs already; else Chromium is started.
 
     Returns:
         The first page of each, by its name.
@@ -102,7 +108,7 @@ def print_book(html: Path, names: Sequence[str], out: Path, *, keep: bool = Fals
         for turn in ("contents without numbers", "contents with numbers"):
             begun = time.perf_counter()
             document.write_text(one_document.join(html, names, start), encoding="utf8")
-            print_once(document, out)
+            print_once(document, out, browser)
             start = page_numbers(out, names)
             print(f"printed, {turn}  ({time.perf_counter() - begun:.0f} s)", flush=True)
     finally:

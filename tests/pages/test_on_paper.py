@@ -30,9 +30,9 @@ def tool() -> object:
         sys.path.remove(str(ROOT / "tools"))
 
 
-def test_a_print_has_numbers_an_outline_and_tags(tool: object, tmp_path: Path) -> None:
+def test_a_print_has_numbers_an_outline_and_tags(tool: object, tmp_path: Path, browser: Browser) -> None:
     out = tmp_path / "three.pdf"
-    first = tool.print_book(books.HTML, NAMES, out)
+    first = tool.print_book(books.HTML, NAMES, out, browser=browser)
     reader = PdfReader(out)
     assert list(first) == NAMES
     assert list(first.values()) == sorted(set(first.values()))
