@@ -3,8 +3,8 @@
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
-  a live robot loads two small scripts, which load the rest when the reader asks for it; one with the study's explorer
-  loads one, one with seeds to pick two.
+  a live robot loads two small scripts, which load the rest when the reader asks for it; one with a part of
+  the study to choose from loads that part's own.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
 * A full stop behind a DOI or an address stays with it (see ``keep_full_stops``).
@@ -17,6 +17,7 @@ import os
 import pydoc
 import re
 import shutil
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +28,17 @@ from sphinx.config import Config
 from sphinx.environment import BuildEnvironment
 
 from inbounds.book.explorables.frame import javascript_files
+from inbounds.book.explorer.claims import SCRIPT as CLAIMS_SCRIPT
 from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
 from inbounds.book.explorer.picked_seeds import SCRIPTS as SEEDS_SCRIPTS
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
-STUDY_EXPLORER = 'class="inbounds-study-explorer"'
-PICKED_SEEDS = 'class="inbounds-picked-seeds"'
+OF_THE_STUDY = {
+    'class="inbounds-study-explorer"': (EXPLORER_SCRIPT,),
+    'class="inbounds-picked-seeds"': SEEDS_SCRIPTS,
+    'class="inbounds-claims"': (CLAIMS_SCRIPT,),
+}  # what a page shows → the scripts that it then needs
 LIVE_FOLDER = "live"  # filled by tools/build_book.py
 LIVE_ROBOT = 'class="inbounds-live-robot"'
 
@@ -49,7 +54,7 @@ def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         target = Path(app.outdir) / "_static" / FOLDER
         target.mkdir(parents=True, exist_ok=True)
-        for script in [*javascript_files(), EXPLORER_SCRIPT, *SEEDS_SCRIPTS]:
+        for script in [*javascript_files(), *chain(*OF_THE_STUDY.values())]:
             shutil.copy2(script, target / script.name)
 
 
@@ -61,11 +66,10 @@ def choose_scripts(
     if EXPLORABLE in context.get("body", ""):
         for script in javascript_files():
             app.add_js_file(f"{FOLDER}/{script.name}")
-    if STUDY_EXPLORER in context.get("body", ""):
-        app.add_js_file(f"{FOLDER}/{EXPLORER_SCRIPT.name}")
-    if PICKED_SEEDS in context.get("body", ""):
-        for script in SEEDS_SCRIPTS:
-            app.add_js_file(f"{FOLDER}/{script.name}")
+    for shown, scripts in OF_THE_STUDY.items():
+        if shown in context.get("body", ""):
+            for script in scripts:
+                app.add_js_file(f"{FOLDER}/{script.name}")
     if LIVE_ROBOT in context.get("body", ""):
         for name in ("status.js", "boot.js"):  # all else is loaded when the reader asks for it
             app.add_js_file(f"{LIVE_FOLDER}/{name}")

@@ -79,7 +79,7 @@ def test_every_erratum_is_checked() -> None:
 def test_the_claims_are_generated() -> None:
     """Chapter and depth page show every claim, and say in words what a verdict is."""
     shown = {
-        "claim_by_claim": ["study_pages.by_subject(thesis)", "study_pages.by_subject(own)"],
+        "claim_by_claim": ["claims(thesis)", "claims(own)"],
         "how_a_claim_is_judged": ["study_pages.ledger(found)"],
     }
     for page, views in shown.items():

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inbounds.book.explorer.claims import claims
 from inbounds.book.report import ledger_table, study_pages
 from inbounds.book.report.changes import GROUPS
 from inbounds.book.report.html import Shown
@@ -57,7 +58,7 @@ def views(outcomes: Outcomes) -> list[Shown]:
         study_pages.found_differences(outcomes, "standard"),
         study_pages.published(outcomes),
         study_pages.ledger(found),
-        study_pages.by_subject(found),
+        claims(found),
         study_pages.decided(found),
     ]
 
@@ -198,21 +199,3 @@ def test_films_that_cannot_be_shown_are_called_missing(nothing: Outcomes) -> Non
 def test_without_the_source_tree_the_message_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="clone the project"):
         study_pages.shipped(tmp_path)
-
-
-def test_each_claim_opens_to_the_words_of_the_thesis(some: Outcomes) -> None:
-    """A line a claim with its verdict; below it the quotation with its place, the test, and each statement."""
-    found = [judge(some, claim) for claim in CHEAP]
-    text = unescape(study_pages.by_subject(found).html)
-    lines = text.split("<details>")[1:]
-    assert len(lines) == len(found)
-    for line, each in zip(lines, found, strict=True):
-        assert f"<b>{quotes.verdict(each).upper()}</b> {each.claim.says}</summary>" in line
-        said = quotes.quote(each.claim)
-        assert said is None or f"“{said.words}” ({said.place})" in line
-        assert all(told in line for told in each.told.splitlines())
-        assert each.counted in line
-        assert each.claim.command in line
-    assert [part.partition("</h4>")[0] for part in text.split("<h4>")[1:]] == list(
-        dict.fromkeys(each.claim.subject for each in found)
-    )

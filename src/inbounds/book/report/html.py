@@ -98,16 +98,6 @@ def bullets(items: Iterable[str]) -> str:
     return str(_HTML.bullets(items))
 
 
-def folds(items: Iterable[tuple[str, str, Sequence[str]]]) -> str:
-    """Return a list of lines that open: a word, a line, and what the line opens to, as plain texts.
-
-    Example:
-        >>> "<summary><b>SUPPORTED</b> a &lt; b</summary>" in folds([("SUPPORTED", "a < b", ["numbers"])])
-        True
-    """
-    return str(_HTML.folds(items))
-
-
 def progress(parts: Mapping[str, tuple[int, int]]) -> str:
     """Return one strip that says of each part how many of its cells are finished, of how many.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from itertools import groupby
 
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
@@ -51,25 +50,6 @@ def ledger(found: Sequence[Finding]) -> Shown:
         if part
     ]
     return html.of_study("the ledger", *tallies, claims)
-
-
-def by_subject(found: Sequence[Finding]) -> Shown:
-    """Return verdicts and claims, a line each, by subject; a line opens to the thesis's words, the test and its result.
-
-    Args:
-        found: in the order of the page.
-    """
-    parts = []
-    for subject, together in groupby(found, key=lambda each: each.claim.subject):
-        lines = [(verdict(each).upper(), each.claim.says, _opened(each)) for each in together]
-        parts += [html.heading(subject, 4), html.folds(lines)]
-    return html.of_study("claims by subject", *(parts or [html.missing("No claim.")]))
-
-
-def _opened(finding: Finding) -> list[str]:
-    """Return what a claim's line opens to: words, test, result, and the command that prints it again."""
-    first = f"{_words(finding)}Test: {finding.claim.test}\n{_why_not(finding)}{finding.told}".splitlines()
-    return [*first, f"{finding.counted} ({finding.claim.standing})", finding.claim.command]
 
 
 def _words(finding: Finding) -> str:

@@ -21,7 +21,7 @@ from inbounds.book.report import html
 from inbounds.book.report.arms import columns_of, curves, difference_table, endpoints, inside, ways
 from inbounds.book.report.changes import afterwards, changes
 from inbounds.book.report.html import KIND, Shown
-from inbounds.book.report.ledger_table import by_subject, decided, findings, ledger
+from inbounds.book.report.ledger_table import decided, findings, ledger
 from inbounds.book.report.over_all_robots import over_all_robots
 from inbounds.book.report.score_tables import found_differences, published, score_sheet
 from inbounds.book.report.study_report import provenance, state
@@ -32,7 +32,6 @@ from inbounds.study.store import ROOT, StudyFolder
 
 __all__ = [
     "afterwards",
-    "by_subject",
     "changes",
     "curves",
     "decided",

@@ -1,0 +1,80 @@
+"""The thesis's claims with their verdicts: a list that opens line by line, and buttons that choose what is shown.
+
+    claims(study_pages.findings(study_pages.shipped()))
+
+Everything stands in the HTML. `claims.js` hides lines and counts those it leaves; without it, and in print, all lines
+are there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from inbounds.book.report import html
+from inbounds.book.report.html import Shown
+from inbounds.book.templates import macros
+from inbounds.study.ledger import Finding
+from inbounds.study.ledger.quotes import NOT_TESTED, quote, verdict
+
+SCRIPT = Path(__file__).with_name("claims.js")
+"""What hides lines; in the built book a page loads it once."""
+MARKS = {"supported": "✓", "refuted": "✗", "undecided": "?", "not tested": "–"}
+"""Verdict → the sign beside its word."""
+FEW = 8
+"""So many claims need no buttons."""
+
+
+def claims(found: Sequence[Finding]) -> Shown:
+    """Return verdicts and claims, a line each, by subject; a line opens to the thesis's words, the test and its result.
+
+    More than `FEW` have buttons, which choose by verdict, and a menu, which chooses by subject.
+
+    Args:
+        found: in the order of the page.
+
+    Example:
+        >>> claims([]), "No claim." in claims([]).html
+        (<study: claims by subject>, True)
+    """
+    if not found:
+        return html.of_study("claims by subject", html.missing("No claim."))
+    subjects = {
+        subject: [_line(each) for each in together]
+        for subject, together in groupby(found, key=lambda each: each.claim.subject)
+    }
+    counts = Counter(map(verdict, found))
+    live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+    element = macros("claims").element(
+        subjects,
+        {word: counts[word] for word in MARKS if counts[word]} if len(found) > FEW else {},
+        MARKS,
+        SCRIPT.with_suffix(".css").read_text(encoding="utf-8"),
+        SCRIPT.read_text(encoding="utf-8") if live else "",
+    )
+    return html.of_study("claims by subject", str(element))
+
+
+def _line(finding: Finding) -> dict[str, Any]:
+    """Return what a claim's line shows, and what it opens to, as plain texts."""
+    said = quote(finding.claim)
+    reason = NOT_TESTED.get(finding.claim.id)
+    return {
+        "id": f"claim-{finding.claim.id}",
+        "verdict": verdict(finding),
+        "says": finding.claim.says,
+        "words": said.words if said else "",
+        "place": said.place if said else "",
+        "test": finding.claim.test,
+        "anew": f"{reason}. Before: {finding.verdict}." if reason else "",
+        "told": finding.told.splitlines(),
+        "counted": f"{finding.counted} ({finding.claim.standing})",
+        "command": finding.claim.command,
+    }
+
+
+__all__ = ["FEW", "MARKS", "SCRIPT", "claims"]
