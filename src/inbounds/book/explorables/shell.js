@@ -52,7 +52,7 @@
     for (const { name, glyph } of all(doc, "GlyphRenderer")) {
       if (glyph.type === "Text") glyph.setv({ text_color: { value: color("ink") }, text_font: { value: font } });
       else glyph.line_color = { value: color(name) };
-      if (glyph.type === "VBar") glyph.setv({ fill_color: { value: color(name) }, hatch_color: { value: color(name) } });
+      if (["VBar", "Patch"].includes(glyph.type)) glyph.setv({ fill_color: { value: color(name) }, hatch_color: { value: color(name) } });
     }
   }
 
