@@ -68,6 +68,18 @@ def test_every_field_says_who_wins_and_leads_to_its_evidence(front: Page) -> Non
     assert fields.locator("a").count() == fields.count()
     for text in fields.all_inner_texts():
         assert any(word in text for word in ("above", "below", "no difference found", "not run")), text
+    table = front.locator("table.winners")
+    algorithms = table.locator("thead th").all_inner_texts()
+    leads = {
+        (row.locator("th").inner_text(), algorithm): row.locator("a").nth(i).evaluate("node => node.href")
+        for row in table.locator("tbody tr").all()
+        for i, algorithm in enumerate(algorithms)
+    }
+    for (robot, algorithm), url in leads.items():
+        front.goto(url)
+        row = front.locator(":target")
+        assert row.inner_text().startswith(f"{robot}, {algorithm}")
+        assert 0 <= row.evaluate("node => node.getBoundingClientRect().top") < 900
 
 
 def test_four_cards_lead_on(front: Page, address: str) -> None:

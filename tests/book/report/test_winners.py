@@ -1,12 +1,13 @@
 """Who wins, in words: the laws by their intervals, what was not run, and links to a place that exists."""
 
+import re
 from pathlib import Path
 
 import nbformat
 import numpy as np
 import pytest
 
-from inbounds.book.report import winners
+from inbounds.book.report import answers, winners
 from inbounds.book.report.equal_start import Evidence
 from inbounds.study.grid import ROBOTS
 from inbounds.study.statistics import Estimate
@@ -50,11 +51,23 @@ def test_the_table_has_every_robot_and_links() -> None:
     assert "none of these cells is finished" in winners.winners([]).html
 
 
-def test_the_evidence_is_where_the_links_lead() -> None:
-    name, _, anchor = winners.EVIDENCE.partition(".html#")
-    cells = nbformat.read(ROOT / "notebooks" / f"{name}.ipynb", as_version=4).cells
-    headings = [line for cell in cells if cell.cell_type == "markdown" for line in cell.source.splitlines()]
-    assert f"## {anchor.replace('-', ' ').capitalize()}" in headings
+def test_each_field_leads_to_the_row_of_its_robot_and_algorithm() -> None:
+    """Where the chapter shows it: a row that names both, and has the numbers of the field's difference."""
+    rows = [row("beta", 4, 9), row("logit-normal", -5, 5, robot="Hopper", algorithm="trpo")]
+    targets = re.findall(r'<a href="(.*?)#(.*?)">', winners.winners(rows).html)
+    assert [page for page, _ in targets] == ["what_happened.html"] * len(targets)
+    shown = "".join(answers.by_endpoint(rows, algorithm).html for algorithm in winners.ALGORITHMS)
+    names = [(robot, algorithm) for robot in ROBOTS for algorithm in winners.ALGORITHMS]
+    for (robot, algorithm), (_, anchor) in zip(names, targets, strict=True):
+        (text,) = re.findall(rf'<tr id="{anchor}">(.*?)</tr>', shown, re.S)
+        assert f">{robot}, {algorithm.upper()}<" in text
+        run = (robot, algorithm) in {("Ant", "ppo"), ("Hopper", "trpo")}
+        assert text.count(">not run<") == (3 if run else 4)
+    assert "6.5\N{NO-BREAK SPACE}[4.0,\N{NO-BREAK SPACE}9.0]<br>found" in shown
+    cells = nbformat.read(ROOT / "notebooks" / "what_happened.ipynb", as_version=4).cells
+    sources = [cell.source for cell in cells if cell.cell_type == "code"]
+    for algorithm in winners.ALGORITHMS:
+        assert f'answers.by_endpoint(rows, "{algorithm}")' in sources
 
 
 def test_the_finding_follows_the_rows() -> None:

@@ -14,6 +14,7 @@ from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.many_resamples import of as of
+from inbounds.book.report.words import HEADS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
@@ -114,18 +115,44 @@ def bars(rows: Sequence[Evidence]) -> list[Bar]:
 
 def by_algorithm(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
     """Return a forest with a panel an algorithm: each law against a Gaussian that starts equally quiet."""
-    return _forest(
-        f"each law against an equally quiet start, {ENDPOINTS[endpoint]}",
-        {a.upper(): of(rows, algorithm=a, endpoint=endpoint) for a in ("ppo", "trpo")},
-    )
+    panels = {a.upper(): of(rows, algorithm=a, endpoint=endpoint) for a in ("ppo", "trpo")}
+    what = f"each law against an equally quiet start, {ENDPOINTS[endpoint]}"
+    return html.of_study(what, _drawn(panels), *(_waiting(panels) if any(panels.values()) else []))
 
 
 def by_endpoint(rows: Sequence[Evidence], algorithm: str) -> Shown:
-    """Return a forest with a panel an endpoint, of one algorithm."""
-    return _forest(
-        f"from an equal start, {algorithm.upper()}",
-        {name: of(rows, algorithm=algorithm, endpoint=e) for e, name in ENDPOINTS.items()},
+    """Return a forest with a panel an endpoint, of one algorithm, and its numbers, a row a robot (`place_of`)."""
+    here = of(rows, algorithm=algorithm)
+    drawn = _drawn({name: of(here, endpoint=e) for e, name in ENDPOINTS.items()})
+    return html.of_study(f"from an equal start, {algorithm.upper()}", drawn, _numbers(here, algorithm))
+
+
+def place_of(robot: str, algorithm: str) -> str:
+    """Return the anchor of a robot's row below the forest of an algorithm.
+
+    Example:
+        >>> place_of("Walker2d", "ppo")
+        'equal-ppo-walker2d'
+    """
+    return f"equal-{algorithm}-{robot.lower()}"
+
+
+def _numbers(rows: Sequence[Evidence], algorithm: str) -> str:
+    """Return the differences of an algorithm with their intervals and grades: a row a robot, whether run or not."""
+    columns = [(e, law) for e in ENDPOINTS for law in LAWS]
+    head = ["robot", *(f"{SERIES[law].label.split(' − ')[0]}, {HEADS[e]}" for e, law in columns)]
+
+    def told(robot: str, endpoint: str, law: str) -> str:
+        found = of(rows, robot=robot, endpoint=endpoint, law=law)
+        numbers = [spoken(row.difference).replace(" ", "\N{NO-BREAK SPACE}") for row in found]
+        return "\n".join(f"{n}\n{grade(row)}" for n, row in zip(numbers, found, strict=True)) or "not run"
+
+    caption = (
+        f"{algorithm.upper()}, minus a Gaussian that starts equally quiet: difference of means with its 95 % interval, "
+        "and how well it is founded."
     )
+    table = [[f"{robot}, {algorithm.upper()}", *(told(robot, *each) for each in columns)] for robot in ROBOTS]
+    return html.table(caption, head, table, anchors=[place_of(robot, algorithm) for robot in ROBOTS])
 
 
 def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
@@ -146,12 +173,12 @@ def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
     return html.of_study(what, html.figure_of(of_robots(panels), alt, _caption({algorithm: here})), *strip)
 
 
-def _forest(what: str, panels: Mapping[str, Sequence[Evidence]]) -> Shown:
+def _drawn(panels: Mapping[str, Sequence[Evidence]]) -> str:
     drawn = {title: bars(rows) for title, rows in panels.items() if rows}
     if not drawn:
-        return html.of_study(what, html.NONE_FINISHED)
+        return html.NONE_FINISHED
     alt = f"Differences with 95 percent intervals, a group of rows per robot. {in_words(drawn)}"
-    return html.of_study(what, html.figure_of(of_robots(drawn), alt, _caption(panels)), *_waiting(panels))
+    return html.figure_of(of_robots(drawn), alt, _caption(panels))
 
 
 def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:

@@ -135,7 +135,11 @@ def figure_of(draw: Callable[[bool], Figure], alt: str, caption: str = "") -> st
 
 
 def table(
-    caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = (0,)
+    caption: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    words: Sequence[int] = (0,),
+    anchors: Sequence[str] = (),
 ) -> str:
     """Return a table of plain texts.
 
@@ -144,28 +148,28 @@ def table(
         head: titles of the columns.
         rows: each as long as the head; a text may have lines.
         words: which columns hold words rather than numbers.
+        anchors: of the rows, one each, for links to them; none by default.
 
     Example:
         >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
         True
     """
-    return str(_HTML.table(caption, head, rows, words))
+    return str(_HTML.table(caption, head, rows, words, anchors))
 
 
-def links(caption: str, columns: Sequence[str], fields: Mapping[str, Mapping[str, str]], target: str) -> str:
+def links(caption: str, columns: Sequence[str], fields: Mapping[str, Mapping[str, tuple[str, str]]]) -> str:
     """Return a table whose fields are links.
 
     Args:
         caption: what it shows.
         columns: their names, the keys of every row.
-        fields: row → column → text.
-        target: address that every field leads to.
+        fields: row → column → text, and the address that it leads to.
 
     Example:
-        >>> '<a href="b.html">x &lt; y</a>' in links("A table.", ["ppo"], {"Ant": {"ppo": "x < y"}}, "b.html")
+        >>> '<a href="b.html#c">x &lt; y</a>' in links("A table.", ["ppo"], {"Ant": {"ppo": ("x < y", "b.html#c")}})
         True
     """
-    return str(_HTML.links(caption, columns, fields, target))
+    return str(_HTML.links(caption, columns, fields))
 
 
 NONE_FINISHED = missing("missing: none of these cells is finished.")

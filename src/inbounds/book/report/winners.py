@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import graded, of, sign
+from inbounds.book.report.answers import graded, of, place_of, sign
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.study.grid import ROBOTS
 
 ALGORITHMS = ("ppo", "trpo")
 NAMES = {"beta": "Beta", "logit-normal": "logit-normal"}
-EVIDENCE = "what_happened.html#from-an-equally-quiet-start"
-"""Where the intervals stand behind every field."""
+EVIDENCE = "what_happened.html"
+"""The page that has a row of intervals for every field."""
 
 
 def field(rows: Sequence[Evidence]) -> str:
@@ -52,7 +52,7 @@ def field(rows: Sequence[Evidence]) -> str:
 
 
 def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
-    """Return the table of robots and algorithms that says who wins, each field a link to the intervals behind it.
+    """Return the table of robots and algorithms that says who wins, each field a link to its own row of intervals.
 
     Args:
         rows: of `equal_start.laws`.
@@ -62,14 +62,20 @@ def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
     if not here:
         return html.of_study("who wins", html.NONE_FINISHED)
     fields = {
-        robot: {algorithm: field(of(here, robot=robot, algorithm=algorithm)) for algorithm in ALGORITHMS}
+        robot: {
+            algorithm: (
+                field(of(here, robot=robot, algorithm=algorithm)),
+                f"{EVIDENCE}#{place_of(robot, algorithm)}",
+            )
+            for algorithm in ALGORITHMS
+        }
         for robot in ROBOTS
     }
     caption = (
         "Final returns: each bounded law minus an equally quiet clipped Gaussian. Each field leads to its intervals; "
         "in brackets, how well it is founded."
     )
-    return html.of_study("who wins", html.links(caption, ALGORITHMS, fields, EVIDENCE))
+    return html.of_study("who wins", html.links(caption, ALGORITHMS, fields))
 
 
 def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: str) -> str:
