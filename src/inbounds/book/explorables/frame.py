@@ -96,7 +96,7 @@ class Explorable:
     columns: Mapping[str, str]
     """Columns of the table: a key of `looks` (which gives colour and line style) and heading."""
     rows: Mapping[str, str]
-    """Rows of the table: key in the model's `table`, and heading."""
+    """Rows of the table: key in the model's `table`, and heading; a key of `looks` gets its line, too."""
     fallback: Callable[[], Figure]
     """Draws the static figure at the initial values."""
     looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.LOOKS)
@@ -165,7 +165,9 @@ class Explorable:
         )
         cells = "<td></td>" * len(self.columns)
         body = "".join(
-            f'<tr data-row="{key}"><th scope="row">{text}</th>{cells}</tr>' for key, text in self.rows.items()
+            f'<tr data-row="{key}"><th scope="row">{_swatch(key, self.looks[key]) if key in self.looks else ""}'
+            f"{text}</th>{cells}</tr>"
+            for key, text in self.rows.items()
         )
         table = f"<table><thead><tr><td></td>{heads}</tr></thead><tbody>{body}</tbody></table>"
         return f'<div class="inbounds-scroll">{table}</div>'
@@ -240,7 +242,15 @@ def _swatch(name: str, look: figures.FamilyStyle) -> str:
 
 
 def slider(
-    name: str, title: str, start: float, end: float, value: float, step: float, *, log: bool = False
+    name: str,
+    title: str,
+    start: float,
+    end: float,
+    value: float,
+    step: float,
+    *,
+    log: bool = False,
+    digits: int = 2,
 ) -> Slider:
     """Return a slider that sets one argument of the model.
 
@@ -252,8 +262,10 @@ def slider(
         value: Initial value.
         step: Step of an arrow key.
         log: The argument is a natural logarithm; show its exponential.
+        digits: Decimals that are shown.
     """
-    code = "return (Math.exp(tick)).toFixed(2)" if log else "return tick.toFixed(2).replace('-', '−')"
+    shown = "Math.exp(tick)" if log else "tick"
+    code = f"return ({shown}).toFixed({digits}).replace('-', '−')"
     return Slider(
         name=name, title=title, start=start, end=end, value=value, step=step, tooltips=False,
         format=CustomJSTickFormatter(code=code), sizing_mode="stretch_width",
