@@ -12,12 +12,12 @@ from tests.pages import browser as book
 
 NAME = "notebooks/what_happened.html"
 SAID, ROWS = ".explorer-said", ".explorer-row .told"
-CHOICES = {"start": 3, "algorithm": 2, "endpoint": 2, "family": 4, "robot": 6}
+CHOICES = {"start": 4, "algorithm": 2, "endpoint": 2, "family": 4, "robot": 6}
 
 
-def opened(context: BrowserContext, address: str) -> tuple[Page, Locator]:
+def opened(context: BrowserContext, address: str, name: str = NAME) -> tuple[Page, Locator]:
     page = context.new_page()
-    page.goto(address + NAME)
+    page.goto(address + name)
     page.evaluate(book.AT_REST)
     explorer = page.locator(".inbounds-study-explorer")
     page.wait_for_selector(".inbounds-study-explorer[data-state=live] .explorer-panels svg")
@@ -90,6 +90,34 @@ def test_what_is_missing_is_one_strip(context: BrowserContext, address: str) -> 
     explorer.locator("input[value=printed]").check()
     strip = explorer.locator(".explorer-missing").inner_text()
     assert re.match(r"\d+ of \d+ differences are there\. Not finished: .*Ant", strip)
+
+
+def test_chapter_16_moves_between_quiet_as_they_come_and_loud(context: BrowserContext, address: str) -> None:
+    """It begins with its own robots and policies; each start changes sentence, forest and curves together."""
+    _, explorer = opened(context, address, "notebooks/why.html")
+    ticked = explorer.locator("input:checked").evaluate_all("nodes => nodes.map((node) => node.value)")
+    assert set(ticked) == {
+        "standard",
+        "trpo",
+        "final",
+        *("gaussian", "clipped-gaussian", "logit-normal"),
+        *("HalfCheetah", "Ant"),
+    }
+    seen = set()
+    for start, words in (
+        ("equal", "equally quiet"),
+        ("standard", "as they come"),
+        ("loud", "equally loud"),
+    ):
+        explorer.locator(f"input[value={start}]").check()
+        said = explorer.locator(SAID).inner_text()
+        assert words in said
+        assert "Logit-normal − Gaussian: " in said
+        assert explorer.locator(ROWS).count() >= 2
+        assert explorer.locator(".explorer-panels svg[role=img]").count() == 2
+        seen.add((said, explorer.locator(".explorer-panels").inner_text()))
+    assert len(seen) == 3
+    assert "Logit-normal, loud" in explorer.locator(".explorer-panels").inner_text()
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

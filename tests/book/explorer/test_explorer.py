@@ -18,12 +18,13 @@ from inbounds.book.explorer.choices import (
     kept_of,
     places,
     planned,
-    pooled_estimate,
     sentence,
     verdict,
 )
+from inbounds.book.explorer.pooled import pooled_estimate
 from inbounds.book.report import answers, as_they_come, study_pages
 from inbounds.book.report.equal_start import Evidence, laws, outcomes_of_both
+from inbounds.book.report.leads import leads_of
 from inbounds.study import analysis
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
@@ -96,6 +97,23 @@ def test_an_equal_start_is_told_as_on_the_static_page(outcomes: Outcomes, data: 
             assert words.startswith(f"{spoken(row.difference)}: ")
             found = {1: "above", -1: "below", 0: ""}[answers.sign(row)]
             assert words.partition(": ")[2].startswith(found or ("no difference found", "too small"))
+
+
+def test_a_loud_start_is_told_as_in_the_forest_of_leads(outcomes: Outcomes, data: dict[str, Any]) -> None:
+    """As `leads` has it, which the chapter shows; the curves are those of the loud cell and of the plain Gaussian."""
+    known = [each for each in leads_of(outcomes_of_both(outcomes)) if each.start == "both loud"]
+    assert {each.robot for each in known} == {"Ant", "HalfCheetah"}
+    for each in known:
+        (row,) = (
+            row
+            for row in data["rows"][f"loud-{each.algorithm}-{each.endpoint}"]
+            if row["robot"] == each.robot
+        )
+        assert row["pair"] == [each.law, "gaussian"]
+        assert row["told"].startswith(f"{spoken(each.difference)}: ")
+        drawn = data["curves"][f"loud-{each.algorithm}"][each.robot]
+        assert [one["name"] for one in drawn] == ["Gaussian", "Logit-normal, loud"]
+        assert not any(one["thin"] for one in drawn)
 
 
 def test_curves_are_the_cells_learning_curves(outcomes: Outcomes, data: dict[str, Any]) -> None:
@@ -189,7 +207,7 @@ PICKS = [
         "robots": list(robots),
     }
     for start, algorithm, endpoint in itertools.product(
-        ("equal", "standard", "printed"), ALGORITHMS, ENDPOINTS
+        ("equal", "standard", "loud", "printed"), ALGORITHMS, ENDPOINTS
     )
     for families in (
         ["gaussian", "beta"],
@@ -235,6 +253,18 @@ def test_the_element_is_small_and_asks_nothing_of_the_network(outcomes: Outcomes
     assert "HalfCheetah: Gaussian" in alt[1]
     monkeypatch.delenv("INBOUNDS_BOOK_BUILD")
     assert "inbounds.chosen =" in shown._repr_html_()  # a live notebook has no page to load it
+
+
+def test_a_page_may_choose_what_is_shown_at_first(outcomes: Outcomes) -> None:
+    html = element.study_explorer(outcomes, algorithm="trpo", robots=("Ant", "HalfCheetah"))._repr_html_()
+    ticked = re.findall(r'name="(\w+)" value="([\w-]+)" checked', html)
+    assert [value for name, value in ticked if name == "robot"] == ["HalfCheetah", "Ant"]
+    assert ("algorithm", "trpo") in ticked
+    assert ("start", "standard") in ticked
+    assert "Learning curves, TRPO, as they come" in html
+    assert "Hopper: Gaussian" not in html
+    with pytest.raises(TypeError, match="no such choice: robot;"):
+        element.study_explorer(outcomes, robot="Ant")
 
 
 def test_without_results_the_page_says_so(tmp_path: Path) -> None:

@@ -19,24 +19,33 @@ from numpy.typing import NDArray
 
 from inbounds.book import verdicts
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.explorer.pooled import pooled_curve, pooled_estimate
 from inbounds.book.report import answers, as_they_come
 from inbounds.book.report.as_they_come import Compared
-from inbounds.book.report.equal_start import LAWS, Evidence, grade, laws, outcomes_of_both, sides
+from inbounds.book.report.equal_start import (
+    LAWS,
+    Evidence,
+    grade,
+    laws,
+    loud_pair,
+    loud_starts,
+    outcomes_of_both,
+    sides,
+)
 from inbounds.book.report.forests import SERIES
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.words import ALGORITHMS
-from inbounds.study import statistics
-from inbounds.study.analysis import CONTRASTS, curve, estimate, generator_for, marked, scores
+from inbounds.study.analysis import CONTRASTS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.second import MARGINS
 from inbounds.study.second.yardsticks import ENDPOINTS
-from inbounds.study.statistics import Estimate
 from inbounds.study.words import side, spoken
 
 STARTS = {
     "equal": "from an equally quiet start",
     "standard": "as they come",
+    "loud": "from an equally loud start",
     "printed": "as the thesis prints",
 }
 """Start → what it is called."""
@@ -75,7 +84,7 @@ class Place:
     @property
     def stands_in(self) -> bool:
         """Whether the first study's cells stand in for the second's."""
-        return isinstance(self.row, Evidence) and self.row.study == 1
+        return self.start == "equal" and isinstance(self.row, Evidence) and self.row.study == 1
 
 
 def planned(start: str, algorithm: str) -> list[tuple[str, str]]:
@@ -87,6 +96,8 @@ def planned(start: str, algorithm: str) -> list[tuple[str, str]]:
     """
     if start == "equal":
         return [(law, "gaussian") for law in LAWS]
+    if start == "loud":
+        return [("logit-normal", "gaussian")] if algorithm == "trpo" else []
     return [(c.first, c.second) for c in CONTRASTS if c.arm in _ARMS[start] and c.algorithm == algorithm]
 
 
@@ -106,6 +117,9 @@ def places(outcomes: Outcomes) -> list[Place]:
     found = [
         Place("equal", row.algorithm, (row.law, "gaussian"), row, sides(both, row)) for row in laws(both)
     ]
+    for told in loud_starts(both):
+        loud, plain = loud_pair(both, told.robot)
+        found.append(Place("loud", told.algorithm, (told.law, "gaussian"), told, ([loud], [plain])))
     for start, arms in _ARMS.items():
         for row in (row for arm in arms for row in as_they_come.compared(outcomes, arm)):
             first, second = (outcomes.of_column(c, [row.robot]) for c in row.contrast.columns)
@@ -277,10 +291,13 @@ def _curves(found: Sequence[Place]) -> dict[str, dict[str, list[dict[str, Any]]]
 def _curve(place: Place, cells: Sequence[Outcome]) -> dict[str, Any]:
     band, family = pooled_curve(cells), cells[0].cell.family
     kept = kept_of(len(cells[0].steps))
-    sigma = ", σ(s)" if place.stands_in else ", free σ"
+    which = {
+        ("equal", "gaussian"): ", σ(s)" if place.stands_in else ", free σ",
+        ("loud", "logit-normal"): ", loud",
+    }
     return {
         "family": family,
-        "name": SHORT[family] + (sigma if (place.start, family) == ("equal", "gaussian") else ""),
+        "name": SHORT[family] + which.get((place.start, family), ""),
         "thin": place.stands_in,
         "seeds": band.n,
         "told": {endpoint: spoken(pooled_estimate(cells, endpoint)) for endpoint in ENDPOINTS},
@@ -289,43 +306,6 @@ def _curve(place: Place, cells: Sequence[Outcome]) -> dict[str, Any]:
             for name, values in (("value", band.value), ("low", band.low), ("high", band.high))
         },
     }
-
-
-def pooled_curve(cells: Sequence[Outcome]) -> Estimate:
-    """Return the learning curve of all seeds of some cells, `[E]`: of one cell that of `analysis.curve`.
-
-    Raises:
-        ValueError: fewer than two seeds count.
-
-    Example:
-        >>> from inbounds.study import StudyFolder
-        >>> cell = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
-        >>> pooled_curve([cell]).n, pooled_curve([cell, cell]).n
-        (10, 20)
-    """
-    if len(cells) == 1 and (alone := curve(cells[0])) is not None:
-        return alone
-    returns = np.concatenate([cell.returns for cell in cells])
-    key = ("curve", *(cell.cell.id for cell in cells))
-    return marked(statistics.learning_curve(returns, generator_for(*key), missing="exclude"), *cells)
-
-
-def pooled_estimate(cells: Sequence[Outcome], endpoint: str) -> Estimate | None:
-    """Return the mean of an endpoint over all seeds of some cells: of one cell that of `analysis.estimate`.
-
-    Example:
-        >>> from inbounds.study import StudyFolder
-        >>> cell = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
-        >>> pooled_estimate([cell, cell], "final").n
-        20
-    """
-    if len(cells) == 1:
-        return estimate(cells[0], endpoint)
-    values = np.concatenate([scores(cell, endpoint) for cell in cells])
-    key = ("estimate", *(cell.cell.id for cell in cells), endpoint)
-    return marked(
-        statistics.bootstrap(values, generator_for(*key), statistic="mean", missing="exclude"), *cells
-    )
 
 
 def _short(x: float, digits: int) -> float:
@@ -342,8 +322,6 @@ __all__ = [
     "kept_of",
     "places",
     "planned",
-    "pooled_curve",
-    "pooled_estimate",
     "sentence",
     "verdict",
 ]

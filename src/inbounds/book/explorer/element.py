@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,14 +30,14 @@ from inbounds.study.outcomes import Outcome, Outcomes
 
 SCRIPT = Path(__file__).with_name("explorer.js")
 """What draws a choice; in the built book a page loads it once."""
-FIRST = {
+FIRST: Mapping[str, Any] = {
     "start": "standard",
     "algorithm": "ppo",
     "endpoint": "final",
     "families": COMPARED,
     "robots": ROBOTS,
 }
-"""What is chosen until the reader chooses, and what the static figure shows."""
+"""What is chosen until the reader chooses, and what the static figure shows, unless a page says otherwise."""
 _COLORS = {
     "light": {"ink": "#22272d", "line": "#5f6770", "grid": "#dfe3e8", "focus": "#9a5b00", "page": "#ffffff"},
     "dark": {"ink": "#ced6dd", "line": "#9ca4af", "grid": "#364150", "focus": "#ffd394", "page": "#14181e"},
@@ -54,6 +55,8 @@ class StudyExplorer:
     """Of `choices`."""
     static: str
     """HTML that stands there without JavaScript and in print."""
+    first: Mapping[str, Any]
+    """What is chosen until the reader chooses, as `FIRST`."""
 
     def __repr__(self) -> str:
         """Return a line that never changes."""
@@ -67,7 +70,7 @@ class StudyExplorer:
             macros("explorer").explorer(
                 self.data,
                 text.replace("</", "<\\/"),
-                FIRST,
+                self.first,
                 self.static,
                 style_sheet(),
                 SCRIPT.read_text(encoding="utf-8") if live else "",
@@ -75,11 +78,15 @@ class StudyExplorer:
         )
 
 
-def study_explorer(outcomes: Outcomes) -> StudyExplorer:
+def study_explorer(outcomes: Outcomes, **first: Any) -> StudyExplorer:
     """Return the study to choose from: robots, algorithm, families, endpoint and start.
 
     Args:
         outcomes: of the first study, as `study_pages.shipped` reads them; the second's are read from the same folder.
+        **first: what is chosen at first, where that is not as in `FIRST`.
+
+    Raises:
+        TypeError: `FIRST` has no such choice.
 
     Example:
         >>> from pathlib import Path
@@ -87,13 +94,21 @@ def study_explorer(outcomes: Outcomes) -> StudyExplorer:
         >>> study_explorer(Outcomes.read(StudyFolder(Path("no/results"))))
         <study: to choose from, robots, algorithm, families, endpoint and start>
     """
-    return StudyExplorer(choices(outcomes), _static(outcomes))
+    if unknown := first.keys() - FIRST.keys():
+        raise TypeError(f"no such choice: {', '.join(sorted(unknown))}; there are {', '.join(FIRST)}")
+    chosen = {**FIRST, **first}
+    return StudyExplorer(choices(outcomes), _static(outcomes, chosen), chosen)
 
 
-def _static(outcomes: Outcomes) -> str:
-    """Return the learning curves of the first choice as a picture, with as few epochs as it takes."""
-    part = Part.of(outcomes, "standard", "ppo")
-    if not part.begun:
+def _static(outcomes: Outcomes, first: Mapping[str, Any]) -> str:
+    """Return the learning curves of the first choice, as they come, as a picture, with as few epochs as it takes."""
+    algorithm = first["algorithm"]
+    begun = {
+        robot: {family: outcome for family, outcome in row.items() if family in first["families"]}
+        for robot, row in Part.of(outcomes, "standard", algorithm).begun.items()
+        if robot in first["robots"]
+    }
+    if not begun:
         return NONE_FINISHED
 
     def thinned(outcome: Outcome | None) -> Curve | None:
@@ -105,17 +120,18 @@ def _static(outcomes: Outcomes) -> str:
         return Curve(outcome.steps[kept], dataclasses.replace(band, low=low, value=value, high=high))
 
     fig = learning_curves(
-        {robot: {family: thinned(o) for family, o in row.items()} for robot, row in part.begun.items()},
+        {robot: {family: thinned(o) for family, o in row.items()} for robot, row in begun.items()},
         ylabel="return of training episodes",
     )
     finals = {
         robot: {family: estimate(o, "final") if o else None for family, o in row.items()}
-        for robot, row in part.begun.items()
+        for robot, row in begun.items()
     }
-    alt = f"Learning curves, PPO, as they come, a panel per robot. Mean final returns: {in_words(finals)}"
+    what = f"Learning curves, {algorithm.upper()}, as they come, a panel per robot"
+    alt = f"{what}. Mean final returns: {in_words(finals)}"
     picture = base64.b64encode(svg_bytes(fig)).decode("ascii")
     plt.close(fig)
-    return str(macros("explorer").static(picture, alt))
+    return str(macros("explorer").static(picture, alt, algorithm))
 
 
 @functools.cache

@@ -186,6 +186,43 @@ def quiet_starts(outcomes: Outcomes) -> list[Evidence]:
     return [row for row in rows if row is not None]
 
 
+def loud_pair(outcomes: Outcomes, robot: str) -> list[Outcome]:
+    """Return a logit-normal that starts as loud as a Gaussian as it comes, and that Gaussian; nothing if one lacks."""
+    columns = (
+        Column("afterwards", "trpo", "logit-normal", "loud-noise"),
+        Column("standard", "trpo", "gaussian"),
+    )
+    found = [each for column in columns if (each := outcomes.find(column, robot)) is not None]
+    return found if len(found) == len(columns) else []
+
+
+def loud_starts(outcomes: Outcomes) -> list[Evidence]:
+    """Return the first minus the second of `loud_pair`, wherever there are both.
+
+    Args:
+        outcomes: of both studies, as `outcomes_of_both` returns them.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> loud_starts(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))))
+        []
+    """
+    return [
+        Evidence(
+            robot,
+            "trpo",
+            "logit-normal",
+            endpoint,
+            difference_of(pair[0], pair[1], endpoint, "both loud", robot, endpoint),
+            study=1,
+        )
+        for robot in ROBOTS
+        if (pair := loud_pair(outcomes, robot))
+        for endpoint in ENDPOINTS
+    ]
+
+
 def sides(outcomes: Outcomes, evidence: Evidence) -> tuple[list[Outcome], list[Outcome]]:
     """Return the finished cells of both sides of a row of `laws`: the bounded law's, then the Gaussian's.
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 from inbounds.book.report import html
 from inbounds.book.report.as_they_come import compared
-from inbounds.book.report.equal_start import laws
+from inbounds.book.report.equal_start import laws, loud_starts
 from inbounds.book.report.forests import Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
-from inbounds.book.report.many_resamples import difference_of
 from inbounds.book.report.study_figures import SHORT
 from inbounds.study.grid import ROBOTS
-from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.outcomes import Outcomes
 from inbounds.study.second import MARGINS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
@@ -78,26 +77,13 @@ def leads_of(outcomes: Outcomes) -> list[Lead]:
         )
         for row in rows
     ]
-    quiet = [
-        Lead(row.robot, row.algorithm, row.law, row.endpoint, "both quiet", row.difference)
-        for row in laws(outcomes)
+    alike = [
+        Lead(row.robot, row.algorithm, row.law, row.endpoint, start, row.difference)
+        for start, rows_of in (("both quiet", laws), ("both loud", loud_starts))
+        for row in rows_of(outcomes)
     ]
-    every = [*plain, *quiet, *_loud(outcomes)]
+    every = [*plain, *alike]
     return [each for each in every if (each.robot, each.algorithm, each.law) in found]
-
-
-def _loud(outcomes: Outcomes) -> list[Lead]:
-    """Return a logit-normal that starts loud minus the Gaussian as it comes, which is as loud."""
-    leads = []
-    for robot in ROBOTS:
-        loud = outcomes.find(Column("afterwards", "trpo", "logit-normal", "loud-noise"), robot)
-        gaussian = outcomes.find(Column("standard", "trpo", "gaussian"), robot)
-        if loud is None or gaussian is None:
-            continue
-        for endpoint in ENDPOINTS:
-            found = difference_of(loud, gaussian, endpoint, "both loud", robot, endpoint)
-            leads.append(Lead(robot, "trpo", "logit-normal", endpoint, "both loud", found))
-    return leads
 
 
 def leads(outcomes: Outcomes) -> Shown:
