@@ -161,7 +161,7 @@ def _curves() -> figure:
     fig = plot("λ", "squared error / gradient²", _LAMBDA, "y", height=300)
     fig.x_range.update(start=-0.02, end=1.02)
     fig.line("x", "y", source=ColumnDataSource({"x": [], "y": []}, name="at"), name="line", line_width=1)
-    for name, look in FAULTS.items():
+    for name, look in reversed(FAULTS.items()):  # without a bias the variance lies on the sum, and shows
         curve(fig, name, look, source=name)
     for name in FAULTS:
         ring = ColumnDataSource({"x": [], "y": []}, name=f"{name}-here")
@@ -186,7 +186,7 @@ def _static(fork: Fork, lam: float) -> Figure:
     with figures.use_style():
         fig, (top, low) = plt.subplots(2, 1, figsize=(figures.WIDTH, 5.0), height_ratios=(2.2, 1))
         top.axvline(lam, color="#5F6770", linewidth=1)
-        for name, values in fork.faults(grid).items():
+        for name, values in reversed(fork.faults(grid).items()):
             look = FAULTS[name]
             top.plot(grid, values, color=look.color, linestyle=look.linestyle, label=look.label)
             at = float(fork.faults(lam)[name])
