@@ -70,6 +70,15 @@ def test_six_robots_stand_in_one_column_that_fits(context: BrowserContext, addre
     )
 
 
+@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
+def test_every_figure_of_the_study_fits(context: BrowserContext, address: str, name: str) -> None:
+    figures = on_a_phone(context, address + name).locator(".inbounds-study figure:has(img)")
+    assert figures.count() >= 6
+    for figure in figures.all():
+        assert figure.locator("picture source").count() == 1
+        assert figure.evaluate("node => node.scrollWidth <= node.clientWidth")
+
+
 @pytest.mark.parametrize("name", SEVERAL)
 def test_no_punctuation_stands_alone_on_a_line(context: BrowserContext, address: str, name: str) -> None:
     assert on_a_phone(context, address + name).evaluate(LONELY) == []

@@ -156,14 +156,21 @@ def test_differences_stand_beside_zero_with_their_corrected_p_value() -> None:
     assert "after Holm's correction" in words(fig)
 
 
-def test_profiles_are_drawn_as_given() -> None:
+@pytest.mark.parametrize("narrow", [False, True])
+def test_profiles_are_drawn_as_given(narrow: bool) -> None:
     taus = np.linspace(0, 2, 21)
     rng = np.random.default_rng(0)
     profiles = {
         "beta": statistics.performance_profile({"a": rng.random(10), "b": 2 * rng.random(10)}, taus, rng),
         "gaussian": None,
     }
-    fig = study_figures.performance_profiles(profiles)
+    fig = study_figures.performance_profiles(profiles, narrow=narrow)
+    assert fig.get_size_inches()[0] == (NARROW if narrow else WIDTH)
+    fig.draw_without_rendering()
+    frame = fig.get_window_extent()
+    for legend in fig.legends:
+        box = legend.get_window_extent(fig.canvas.get_renderer())
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
     (line,) = fig.axes[0].lines
     assert np.array_equal(line.get_xydata(), np.stack([taus, profiles["beta"].share.value], -1))
     assert fig.axes[0].texts[0].get_text() == "Gaussian, clipped: missing"

@@ -136,6 +136,7 @@ def verdict(row: Row, *, brief: bool = False) -> str:
         brief: without the effects that remain possible, for a place that has the interval beside it.
 
     Example:
+        >>> from inbounds.study.statistics import Estimate
         >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
         >>> verdict(Evidence("Ant", "ppo", "beta", "final", ahead, study=1))
         'above, suggested'

@@ -19,7 +19,8 @@ def pooled_curve(cells: Sequence[Outcome]) -> Estimate:
         ValueError: fewer than two seeds count.
 
     Example:
-        >>> from inbounds.study import StudyFolder
+        >>> from inbounds.study.outcomes import Outcomes
+        >>> from inbounds.study.store import StudyFolder
         >>> cell = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
         >>> pooled_curve([cell]).n, pooled_curve([cell, cell]).n
         (10, 20)
@@ -35,7 +36,8 @@ def pooled_estimate(cells: Sequence[Outcome], endpoint: str) -> Estimate | None:
     """Return the mean of an endpoint over all seeds of some cells: of one cell that of `analysis.estimate`.
 
     Example:
-        >>> from inbounds.study import StudyFolder
+        >>> from inbounds.study.outcomes import Outcomes
+        >>> from inbounds.study.store import StudyFolder
         >>> cell = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
         >>> pooled_estimate([cell, cell], "final").n
         20

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from matplotlib.figure import Figure
+
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.html import NONE_FINISHED, Shown
@@ -71,7 +73,10 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
         for panel, row in panels.items()
         if any(row.values())
     }
-    fig = interval_panels(panels, xlabel="change of the mean final return", reference=0.0)
+
+    def draw(narrow: bool) -> Figure:
+        return interval_panels(panels, xlabel="change of the mean final return", reference=0.0, narrow=narrow)
+
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{LOOKS[f].label} {spoken(e)}" for f, e in row.items())
         for panel, row in panels.items()
@@ -83,7 +88,7 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
     caption = f"{where}: changed cell minus cell of comparison."
     table = [[*(each[name] for name in told), *row] for each, row in zip(names, rows, strict=True)]
     head = [*told, *HEADS.values()]
-    parts = [html.figure(fig, alt), html.table(caption, head, table, range(len(told)))]
+    parts = [html.figure_of(draw, alt), html.table(caption, head, table, range(len(told)))]
     if any(done < planned for done, planned in counts.values()):
         parts.append(html.progress(_without_shared(counts)))
     return parts

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
@@ -16,6 +18,7 @@ from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, REFERENCE
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.statistics import Estimate
 from inbounds.study.words import percent, spoken
 
 NORMALIZED = "0: return of the first epoch, 1: final return, of PPO × Gaussian in arm 1"
@@ -40,11 +43,15 @@ def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
             for a in ALGORITHMS
         }
         alt = f"IQM of the normalised {name} over all robots ({title}). {in_words(found)}"
-        fig = interval_panels(found, xlabel=f"normalised {name}")
-        parts.append(html.figure(fig, alt, f"IQM of all runs, normalised per robot ({NORMALIZED})."))
+        draw = functools.partial(_iqm, found, f"normalised {name}")
+        parts.append(html.figure_of(draw, alt, f"IQM of all runs, normalised per robot ({NORMALIZED})."))
     parts += [_improvement(outcomes, arm, title), *_without_diverged(outcomes, arm, title, columns)]
     parts += [_profiles(outcomes, f"{a.upper()}, {title}", columns[a]) for a in ALGORITHMS]
     return html.of_study(f"over all robots, {title}", *parts)
+
+
+def _iqm(found: Mapping[str, Mapping[str, Estimate | None]], xlabel: str, narrow: bool) -> Figure:
+    return interval_panels(found, xlabel=xlabel, narrow=narrow)
 
 
 def _improvement(outcomes: Outcomes, arm: str, title: str, *, without_diverged: bool = False) -> str:
@@ -94,5 +101,8 @@ def _profiles(outcomes: Outcomes, title: str, columns: Mapping[str, Column]) -> 
         f"Performance profiles ({title}): the share of runs above each normalised final return, a line "
         f"per family. Above 1: {above or 'missing'}"
     )
-    fig = performance_profiles(profiles, xlabel="normalised final return τ")
-    return html.figure(fig, alt, f"{title}. {NORMALIZED}.")
+    return html.figure_of(
+        lambda narrow: performance_profiles(profiles, xlabel="normalised final return τ", narrow=narrow),
+        alt,
+        f"{title}. {NORMALIZED}.",
+    )

@@ -8,15 +8,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-import matplotlib.pyplot as plt
-import numpy as np
-from matplotlib.figure import Figure
-
-from inbounds.book.drawing.figures import LOOKS, WIDTH, use_style
 from inbounds.book.report import html
+from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
-from inbounds.study.grid import FREE, ROBOTS, SECOND, second_cells
+from inbounds.study.grid import FREE, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
     GAUSSIAN,
@@ -103,48 +99,23 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
     )
     return html.of_study(
         "the primary comparison",
-        html.figure(forest(known), alt),
+        html.figure_of(
+            of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
+        ),
         html.table(caption, head, table, words=(0, 1, 2, 8)),
     )
 
 
-def forest(rows: Sequence[PrimaryRow]) -> Figure:
-    """Draw differences with their intervals in units of the margin, so that all robots share an axis.
-
-    Args:
-        rows: with a difference each.
-    """
-    robots = [robot for robot in ROBOTS if any(row.robot == robot for row in rows)]
-    with use_style():
-        fig, axes = plt.subplots(
-            1, len(ENDPOINTS), figsize=(WIDTH, 1.2 + 0.5 * len(robots)), sharey=True, squeeze=False
-        )
-        for ax, (endpoint, name) in zip(axes[0], ENDPOINTS.items(), strict=True):
-            ax.axvspan(-1, 1, color="#DFE3E8", alpha=0.6, linewidth=0)
-            ax.axvline(0, color="#5F6770", linewidth=1)
-            for row in (row for row in rows if row.endpoint == endpoint and row.difference is not None):
-                place = robots.index(row.robot) + 0.18 * (2 * BOUNDED.index(row.law) - 1)
-                look, gap = LOOKS[row.law], row.difference
-                assert gap is not None
-                low, value, high = (float(x) / row.margin for x in (gap.low, gap.value, gap.high))
-                ax.plot([low, high], [place, place], color=look.color, linewidth=2)
-                filled = look.color if row.whole else "none"
-                ax.plot(value, place, marker=look.marker, color=look.color, markerfacecolor=filled)
-            ax.set(title=name, xlabel="difference, in margins")
-            ax.set_yticks(np.arange(len(robots)), robots)
-        axes[0, 0].invert_yaxis()
-        handles = [
-            plt.Line2D(
-                [],
-                [],
-                color=LOOKS[law].color,
-                marker=LOOKS[law].marker,
-                label=f"{LOOKS[law].label} − Gaussian",
-            )
-            for law in BOUNDED
+def _bars(rows: Sequence[PrimaryRow]) -> dict[str, list[Bar]]:
+    """Return the differences by endpoint, as bars in units of the margin; hollow where seeds are still to be run."""
+    return {
+        name: [
+            Bar(row.robot, row.law, row.difference, row.margin, hollow=not row.whole)
+            for row in rows
+            if row.endpoint == endpoint and row.difference is not None
         ]
-        fig.legend(handles=handles, loc="outside upper center", ncols=2)
-    return fig
+        for endpoint, name in ENDPOINTS.items()
+    }
 
 
 def over_robots(outcomes: Outcomes) -> Shown:

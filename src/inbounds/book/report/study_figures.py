@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style, use_style
 from inbounds.book.report.study_panels import (
+    NARROW,
     SMALL,
     families_in,
     family_legend,
@@ -265,13 +266,14 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
 
 
 def performance_profiles(
-    profiles: Mapping[str, Profile | None], *, xlabel: str = "normalised score τ"
+    profiles: Mapping[str, Profile | None], *, xlabel: str = "normalised score τ", narrow: bool = False
 ) -> Figure:
     """Draw performance profiles with bands: the share of runs that score more than τ, a line per policy family.
 
     Args:
         profiles: per family its profile, or None where it is missing.
         xlabel: what τ is, and how it is normalised.
+        narrow: for a phone.
 
     Returns:
         The figure.
@@ -288,7 +290,7 @@ def performance_profiles(
     """
     families = families_in([profiles])
     with use_style():
-        fig, ax = plt.subplots(figsize=(WIDTH, 4.6))
+        fig, ax = plt.subplots(figsize=(NARROW if narrow else WIDTH, 4.6))
         for family, profile in profiles.items():
             if profile is not None:
                 style = family_style(family)
@@ -307,6 +309,7 @@ def performance_profiles(
         list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
         ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
-        family_legend(fig, families)
-        note(fig, "Line", "Band", [p.share for p in profiles.values() if p], ", at each τ by itself")
+        family_legend(fig, families, narrow=narrow)
+        shares = [p.share for p in profiles.values() if p]
+        note(fig, "Line", "Band", shares, ", at each τ by itself", narrow=narrow)
     return fig
