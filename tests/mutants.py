@@ -209,6 +209,20 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/explorables/test_bounded_densities.py::test_gaussian_is_the_tangent_of_the_squash",
     ),
     Mutant(
+        "the lens is too wide near a bound",
+        "book/explorables/beta_lens.js",
+        "(near * near * far) / (1 + near)",
+        "(near * far * far) / (1 + near)",
+        "tests/book/explorables/test_beta_lens.py::test_reach_is_what_the_square_allows",
+    ),
+    Mutant(
+        "the baseline is left out of the spread of a step",
+        "book/explorables/reinforce_step.js",
+        "const rest = 1 - baseline;",
+        "const rest = 1;",
+        "tests/book/explorables/test_reinforce_step.py::test_covariance_is_the_quadrature_s",
+    ),
+    Mutant(
         "the explorable counts modes on one side",
         "book/explorables/numerics.js",
         "if (g(-turn) > 0) modes",
