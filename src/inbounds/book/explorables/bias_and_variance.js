@@ -32,7 +32,7 @@ inbounds.models["bias-and-variance"] = ({ lam, missed, offset, visits }) => {
 
   const number = (v, digits = 3) => v.toFixed(digits);
   const cells = (at) => names.map((name) => number(faults(at)[name]));
-  const percent = (v) => `${number(100 * v, 0)} %`;
+  const percent = (v) => `${number(100 * v, 0)}\u202f%`;
   const first = weights.slice(0, 4).map((w) => number(w, 2)).join(", ");
   const judgement =
     missed === 0

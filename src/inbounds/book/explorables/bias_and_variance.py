@@ -140,7 +140,7 @@ def bias_and_variance(
         controls=(
             slider("lam", "λ", *_LAMBDA, lam, 0.05),
             slider("missed", "critic's error on the roads", *_MISSED, missed, 0.1),
-            slider("offset", "critic's error at the fork (baseline)", *_OFFSET, offset, 0.1),
+            slider("offset", "critic's error at the fork", *_OFFSET, offset, 0.1),
             count,
         ),
         plots=(_curves(), _weights()),
@@ -195,7 +195,7 @@ def _static(fork: Fork, lam: float) -> Figure:
         smallest = float(fork.faults(best)["sum"])
         top.plot([best], [smallest], "D", color="#22272D", markerfacecolor="none", ms=8, mew=1.5)
         top.set(xlabel="λ", ylabel="squared error / gradient²", ylim=(0, None))
-        top.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=3)
+        top.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=3, reverse=True)
         low.bar(steps, (fork.gamma * lam) ** steps, width=0.6, color="#5F6770")
         low.set(xlabel="l, steps after the fork", ylabel="weight (γλ)ˡ", ylim=(0, 1.05))
     return fig
