@@ -79,6 +79,21 @@ def test_every_figure_of_the_study_fits(context: BrowserContext, address: str, n
         assert figure.evaluate("node => node.scrollWidth <= node.clientWidth")
 
 
+# Tables of the study whose first number begins where nobody sees it: less than so many pixels of it are in view.
+FAR = """tables => tables.map((table) => {
+  const number = [...table.tBodies[0].rows[0].cells].find((cell) => !cell.matches('.words, .long'));
+  const seen = number ? table.getBoundingClientRect().right - number.getBoundingClientRect().left : 1000;
+  return [Math.round(seen), table.caption.textContent.slice(0, 40)];
+}).filter(([seen]) => seen < 50)"""
+
+
+@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
+def test_the_first_result_stands_beside_the_name(context: BrowserContext, address: str, name: str) -> None:
+    tables = on_a_phone(context, address + name).locator(".inbounds-study .table table")
+    assert tables.count() >= 6
+    assert tables.evaluate_all(FAR) == []
+
+
 @pytest.mark.parametrize("name", SEVERAL)
 def test_no_punctuation_stands_alone_on_a_line(context: BrowserContext, address: str, name: str) -> None:
     assert on_a_phone(context, address + name).evaluate(LONELY) == []

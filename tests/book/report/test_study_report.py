@@ -113,10 +113,10 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     assert not any(caption.startswith("Differences of means (PPO") for caption in page.tables)
     rows = page.table("Endpoints (PPO, standard")
     (there,) = [row for row in rows[1:] if row[2] != "missing"]
-    assert there[:4] == ["Hopper", "Beta", "10", "0"]
+    assert there[:2] + there[-2:] == ["Hopper", "Beta", "10", "0"]
     outcome = Outcomes.read(folder).finished["standard-hopper-ppo-beta"]
-    assert there[4] == spoken(analysis.estimate(outcome, "final"))
-    assert there[7] == spoken(analysis.estimate(outcome, "area", "iqm"))
+    assert there[2] == spoken(analysis.estimate(outcome, "final"))
+    assert there[5] == spoken(analysis.estimate(outcome, "area", "iqm"))
     assert len(rows) == 1 + 3
     (endpoints,) = [caption for caption in page.tables if caption.startswith("Endpoints (PPO")]
     assert endpoints.endswith("Not finished: HalfCheetah, Swimmer, Walker2d, Ant, Humanoid.")
@@ -144,7 +144,7 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     )
     assert row[8:] == [spoken(gaps["Ant"].difference), p_value(gaps["Ant"].p_adjusted), verdict(gaps["Ant"])]
     without = page.table("Means of the cells concerned (PPO")
-    assert [line[:3] for line in without[1:]] == [["Swimmer", "Gaussian, clipped", "8"]]
+    assert [line[:2] + line[-1:] for line in without[1:]] == [["Swimmer", "Gaussian, clipped", "8"]]
     assert "Differences of means (PPO, standard practice, without seeds that diverged" in " ".join(
         page.tables
     )

@@ -123,8 +123,8 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         return interval_panels(finals, xlabel=label, narrow=narrow)
 
     alt = f"Final returns ({part.title}) with intervals, a panel per robot: {in_words(finals)}"
-    head = ["robot", "family", "seeds", "diverged"]
-    head += [f"{name}, {statistic}" for name in HEADS.values() for statistic in ("mean", "IQM")]
+    measures = [f"{name}, {statistic}" for name in HEADS.values() for statistic in ("mean", "IQM")]
+    head = ["robot", "family", *measures, "seeds", "diverged"]
     rows = []
     for robot, row in part.begun.items():
         for family, outcome in row.items():
@@ -133,7 +133,7 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
                 continue
             numbers = [spoken(analysis.estimate(outcome, e, s)) for e in ENDPOINTS for s in ("mean", "iqm")]
             counts = [str(len(outcome.diverged)), str(int(outcome.diverged.sum()))]
-            rows.append([robot, LOOKS[family].label, *counts, *numbers])
+            rows.append([robot, LOOKS[family].label, *numbers, *counts])
     caption = (
         f"Endpoints ({part.title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval."
         f"{_unfinished(part.begun)}"
@@ -221,9 +221,9 @@ def _means_without_diverged(part: Part) -> str:
     for robot, label, outcome in part.finished():
         if outcome.diverged.any():
             found = [analysis.estimate(outcome, e, without_diverged=True) for e in ENDPOINTS]
-            rows.append([robot, label, str(int((~outcome.diverged).sum())), *map(spoken, found)])
+            rows.append([robot, label, *map(spoken, found), str(int((~outcome.diverged).sum()))])
     caption = f"Means of the cells concerned ({part.title}), without seeds that diverged."
-    return html.table(caption, ["robot", "family", "seeds", *HEADS.values()], rows, words=(0, 1))
+    return html.table(caption, ["robot", "family", *HEADS.values(), "seeds"], rows, words=(0, 1))
 
 
 _DIAGNOSTICS: Mapping[str, str] = {

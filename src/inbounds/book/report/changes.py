@@ -86,9 +86,17 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
     shared = [text for name, text in names[0].items() if name not in told]
     where = f"{title} ({', '.join(shared)})" if shared else title
     caption = f"{where}: changed cell minus cell of comparison."
-    table = [[*(each[name] for name in told), *row] for each, row in zip(names, rows, strict=True)]
-    head = [*told, *HEADS.values()]
-    parts = [html.figure_of(draw, alt), html.table(caption, head, table, range(len(told)))]
+    first, last = (
+        [n for n in told if n != "variant"],
+        [n for n in told if n == "variant"],
+    )  # results stay in view
+    table = [
+        [*(each[name] for name in first), *row, *(each[name] for name in last)]
+        for each, row in zip(names, rows, strict=True)
+    ]
+    head = [*first, *HEADS.values(), *last]
+    words = [i for i, name in enumerate(head) if name in told]
+    parts = [html.figure_of(draw, alt), html.table(caption, head, table, words)]
     if any(done < planned for done, planned in counts.values()):
         parts.append(html.progress(_without_shared(counts)))
     return parts

@@ -12,6 +12,7 @@ from inbounds.book.report import html
 from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
+from inbounds.book.report.words import HEADS
 from inbounds.study.grid import FREE, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
@@ -77,18 +78,18 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             for row in known
         )
     )
-    head = ["robot", "law", "endpoint", "seeds", "difference", "margin", "p", "p, Holm over 24", "finding"]
+    head = ["robot", "law", "endpoint", "difference", "finding", "margin", "p", "p, Holm over 24", "seeds"]
     table = [
         [
             row.robot,
             SHORT[row.law],
-            ENDPOINTS[row.endpoint],
-            str(row.difference.n) if row.difference else "",
+            HEADS[row.endpoint],
             spoken(row.difference),
+            row.finding or ("missing" if row.difference is None else "waits for seeds"),
             f"±{row.margin:g}",
             p_value(row.p_value),
             p_value(row.p_adjusted),
-            row.finding or ("missing" if row.difference is None else "waits for seeds"),
+            str(row.difference.n) if row.difference else "",
         ]
         for row in rows
     ]
@@ -102,7 +103,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
         html.figure_of(
             of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
         ),
-        html.table(caption, head, table, words=(0, 1, 2, 8)),
+        html.table(caption, head, table, words=(0, 1, 2, 4)),
     )
 
 
@@ -149,52 +150,42 @@ def equal_starts(outcomes: Outcomes) -> Shown:
         rows.append(
             [
                 cell.robot,
-                cell.arm,
-                cell.algorithm.upper(),
-                column_name(column),
+                f"{cell.algorithm.upper()}: {column_name(column)}",
                 f"{start['action_std']:.3f}",
                 "as it comes" if asked is None else f"{asked:g}{', failed' if failed else ''}",
                 percent(start["saturation"], 1),
                 f"{start['return']:.0f}".replace("-", "−"),
+                cell.arm,
             ]
         )
     if not rows:
         return html.of_study("the manipulation check", NONE_FINISHED)
-    head = [
-        "robot",
-        "arm",
-        "algorithm",
-        "column",
-        "executed noise",
-        "asked for",
-        "at a bound",
-        "first return",
-    ]
+    head = ["robot", "column", "executed noise", "asked for", "at a bound", "first return", "arm"]
     caption = "Manipulation check: the untrained policies, means over seeds of the first epoch."
-    return html.of_study("the manipulation check", html.table(caption, head, rows, words=(0, 1, 2, 3)))
+    return html.of_study("the manipulation check", html.table(caption, head, rows, words=(0, 1, 6)))
 
 
 def secondary_comparisons(outcomes: Outcomes) -> Shown:
     """Return the secondary tests whose cells are finished, as a table."""
     rows = [
         [
-            row.question,
             f"{row.pair.first.algorithm.upper()}: {column_name(row.pair.first)} − {column_name(row.pair.second)}",
             row.robot,
-            ENDPOINTS[row.endpoint],
+            HEADS[row.endpoint],
             spoken(row.comparison.difference),
+            verdict(row.comparison),
             p_value(row.comparison.p_adjusted),
             p_value(row.p_over_everything),
-            verdict(row.comparison),
+            row.question,
         ]
         for row in secondary(_second(outcomes))
         if row.comparison.difference is not None
     ]
     if not rows:
         return html.of_study("the secondary comparisons", NONE_FINISHED)
-    head = ["question", "difference", "robot", "endpoint", "", "p, Holm over robots", "over everything", ""]
+    head = ["difference", "robot", "endpoint", "", "", "p, Holm over robots", "over everything", "question"]
     caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
-    return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 3, 7)))
+    return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
 
 
 def engine_check(outcomes: Outcomes) -> Shown:
@@ -206,18 +197,18 @@ def engine_check(outcomes: Outcomes) -> Shown:
         [
             robot,
             SHORT[family],
-            ENDPOINTS[endpoint],
+            HEADS[endpoint],
             f"{e.difference:.0f} [{e.low:.0f}, {e.high:.0f}]".replace("-", "−"),
-            p_value(e.p_value),
             "equivalent" if e.equivalent else "undecided",
+            p_value(e.p_value),
         ]
         for (family, robot, endpoint), e in agreed.items()
     ]
     caption = (
         "Compiled minus autograd, PPO, equal start: two one-sided tests within the margins; 90 % intervals."
     )
-    head = ["robot", "family", "endpoint", "difference", "p", ""]
-    return html.of_study("the two engines", html.table(caption, head, rows, words=(0, 1, 2, 5)))
+    head = ["robot", "family", "endpoint", "difference", "", "p"]
+    return html.of_study("the two engines", html.table(caption, head, rows, words=(0, 1, 2, 4)))
 
 
 def second_study(outcomes: Outcomes) -> Iterator[str]:
