@@ -36,12 +36,12 @@ format: setup  ## let ruff format the code, and strip pictures from the stored n
 notebooks: setup  ## execute notebooks and store their text outputs  (NB=notebooks/ppo.ipynb for some)
 	@$(PY) tools/execute_notebooks.py $(NB)
 
-pages: book  ## open every built page in headless Chromium and check it
-	@tools/setup.sh --with-browser
+pages: book  ## open every built page in headless Chromium, six in Firefox, and check them
+	@tools/setup.sh --with-browsers
 	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
 
 pdf: book  ## print the whole book into one PDF, _build/pdf/in-bounds.pdf
-	@tools/setup.sh --with-browser
+	@tools/setup.sh --with-chromium
 	@$(PY) tools/print_book.py
 
 slides: book  ## a deck of key statements and figures for each core chapter, in _build/slides

@@ -55,13 +55,23 @@ install_system_packages() {
     { tail -n 5 .venv/apt.log >&2; fail "apt-get could not install ${missing[*]} (network? see .venv/apt.log)"; }
 }
 
-# The names by which tests/pages/browser.py looks for a browser, too.
-browser_is_there() {
+on_path() {
   local name
-  for name in "${INBOUNDS_CHROMIUM:-}" chromium chromium-browser google-chrome google-chrome-stable chrome; do
+  for name in "$@"; do
     [ -z "$name" ] || ! command -v "$name" >/dev/null || return 0
   done
   return 1
+}
+
+# What `--with-chromium` and `--with-browsers` ask for, by the names that tests/pages looks for, too.
+install_browsers() {
+  case "$1" in --with-chromium | --with-browsers)
+    on_path "${INBOUNDS_CHROMIUM:-}" chromium chromium-browser google-chrome google-chrome-stable chrome ||
+      install_system_packages .venv/bin/python chromium ;;
+  esac
+  case "$1" in --with-browsers)
+    on_path "${INBOUNDS_FIREFOX:-}" firefox-esr firefox || install_system_packages .venv/bin/python firefox-esr ;;
+  esac
 }
 
 # What the stamp must say for the environment to be up to date.
@@ -69,7 +79,7 @@ fingerprint() { { cat pyproject.toml constraints.txt apt.txt tools/setup.sh; .ve
 
 stamp=.venv/.complete
 if [ -x .venv/bin/python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint 2>/dev/null)" ]; then
-  [ "${1:-}" != --with-browser ] || browser_is_there || install_system_packages .venv/bin/python chromium
+  install_browsers "${1:-}"
   exit 0
 fi
 
@@ -92,5 +102,5 @@ say "Installing the pinned packages (a few minutes the first time)"
   fail "pip could not install the packages. Check the network (or the proxy and index settings of pip), then run the same command again: it goes on where it stopped"
 .venv/bin/python -m pip check --disable-pip-version-check >/dev/null || fail "the installed packages contradict each other: run  make distclean  and try again"
 fingerprint > "$stamp"
-[ "${1:-}" != --with-browser ] || browser_is_there || install_system_packages .venv/bin/python chromium
+install_browsers "${1:-}"
 say "The environment is ready (.venv)"

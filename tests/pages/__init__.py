@@ -1,1 +1,1 @@
-"""Tests of the built book in headless Chromium (`make pages`)."""
+"""Tests of the built book in headless Chromium, some of them in Firefox (`make pages`)."""

@@ -98,6 +98,18 @@ def test_nothing_moves_while_a_page_opens(
     assert min(shifts) <= 0.05
 
 
+@pytest.mark.parametrize("name", ["notebooks/untrained_returns.html", "notebooks/trpo.html"])
+def test_nothing_moves_on_a_slow_processor(context: BrowserContext, address: str, name: str) -> None:
+    """A page is painted before the whole of it has come: its scrollbar must not push it aside."""
+    page = context.new_page()
+    context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 6})
+    page.route("**/mathjax/*.js", lambda route: route.abort())
+    page.add_init_script(SHIFT)
+    page.goto(address + name, wait_until="networkidle", timeout=60_000)
+    page.evaluate(book.AT_REST)
+    assert page.evaluate("window.shift") <= 0.05
+
+
 @pytest.mark.parametrize("name", FIGURES)
 def test_figures_are_numbered_and_say_what_their_alt_text_says(
     context: BrowserContext, address: str, name: str
