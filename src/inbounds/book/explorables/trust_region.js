@@ -106,7 +106,7 @@ inbounds.models["trust-region"] = ({ log_sigma, peak, log_max_kl }) => {
       `At σ = ${number(sigma, 2)} a change of μ costs ${number(cost, 1) === "1.0" ? "" : `${number(cost, 1)} times `}as many nats as an equal change of log σ. ` +
       (part > 0.995
         ? "Here the plain gradient points nearly where the natural one does. "
-        : `The plain gradient does not see that: at the same quadratic divergence it is promised ${number(100 * part, 0)} % of the natural step's gain. `) +
+        : `The plain gradient does not see that: at the same quadratic divergence it is promised ${number(100 * part, 0)}\u00a0% of the natural step's gain. `) +
       (kept === 1
         ? "The natural step's exact divergence is within the bound, and the line search keeps all of it."
         : `The natural step's exact divergence is ${number(exact / maxKl, 2)} times the bound, and the line search keeps ${share(kept)} of it.`),

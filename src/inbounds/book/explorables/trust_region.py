@@ -183,9 +183,11 @@ def _plane() -> figure:
     fig.line("x", "y", source=data["level"], name="line", line_width=1)
     for name, look in STEPS.items():
         curve(fig, name, look, source=name)
-        for point, size, width in (("end", 14, 3), ("kept", 2, 7)):
+        for point, marker, size in (("end", "circle", 14), ("kept", "dot", 40)):
             source = ColumnDataSource({"x": [], "y": []}, name=f"{name}-{point}")
-            fig.scatter("x", "y", source=source, name=name, size=size, line_width=width, fill_alpha=0.0)
+            fig.scatter(
+                "x", "y", source=source, name=name, marker=marker, size=size, line_width=3, fill_alpha=0.0
+            )
     return fig
 
 
