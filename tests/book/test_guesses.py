@@ -12,6 +12,8 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import docutils_namespace, patch_docutils
 
+from tests.book.anatomy import REWRITTEN, block, prose_of
+
 ROOT = Path(__file__).resolve().parents[2]
 EXTENSIONS = ROOT / "book" / "_ext"
 
@@ -231,3 +233,26 @@ def test_numbers_are_shown_with_three_digits(number: float, text: str) -> None:
         sys.path.remove(str(EXTENSIONS))
     assert guesses.shown(number) == text
     assert isinstance(guesses.element("p"), nodes.Element)
+
+
+def told_before(prose: str) -> set[str]:
+    """The truths that a reader has already read where the page asks for them."""
+    box = block(prose, "Predict")
+    above = prose[: prose.index(box)] + box.split("{dropdown} Answer")[0]
+    return {
+        truth
+        for truth in re.findall(r"^:truth: (\S+)$", box, re.M)
+        if re.search(rf"\{{glue(?::\w+)?\}}`{re.escape(truth)}[:`]", above)
+    }
+
+
+@pytest.mark.parametrize("chapter", REWRITTEN)
+def test_no_number_is_told_before_it_is_asked_for(chapter: str) -> None:
+    assert told_before(prose_of(ROOT / "notebooks" / f"{chapter}.ipynb")) == set()
+
+
+@pytest.mark.parametrize("said", ["{glue:text}`share:.0%`", "{glue:text}`share`", "{glue}`share`"])
+def test_a_number_that_is_told_before_it_is_asked_for_is_seen(said: str) -> None:
+    page = f"- It is SAID.\n\n````{{admonition}} Predict\n:class: predict\n\n{BOX}\n````"
+    assert told_before(page.replace("SAID", said)) == {"share"}
+    assert told_before(page.replace("SAID", "{glue:text}`share-of-others:.0%`")) == set()
