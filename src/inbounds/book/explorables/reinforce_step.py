@@ -134,8 +134,8 @@ def reinforce_step(
         rate: Initial learning rate, in [0.1, 1].
 
     Returns:
-        An explorable with three plots: the draws on the reward, the policy before and after, and the gradients of
-        200 batches about the exact one; and a table of expected rewards, steps, and their spreads.
+        An explorable with the draws on the reward, the policy before and after, and the gradients of 200 batches about
+        the exact one; and a table of expected rewards, steps, and their spreads.
 
     Raises:
         ValueError: If a value lies outside its slider.
