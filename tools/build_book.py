@@ -36,6 +36,7 @@ CODE = (
     "benchmarks/equivalence.py",
     "benchmarks/report.py",
     "benchmarks/validate.py",
+    "benchmarks/results/engines/ppo-logit-normal/engines.json",
     "benchmarks/results/live.json",
     "benchmarks/results/speed.json",
     "benchmarks/results/validation/curves.parquet",
