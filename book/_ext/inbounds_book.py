@@ -2,6 +2,8 @@
 
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
+* No script holds up a page: what a page needs runs once the page is read (see ``let_pages_go_first``), BokehJS and the
+  explorables once it stands (see ``load_late``); the search's index is loaded by the search alone (``_templates``).
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
   a live robot loads two small scripts, which load the rest when the reader asks for it; one with a part of
   the study to choose from loads that part's own.
@@ -13,10 +15,13 @@
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
+import json
 import os
 import pydoc
 import re
 import shutil
+import zlib
+from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -64,8 +69,7 @@ def choose_scripts(
     """Drop thebe's scripts from every page; add those of explorables and live robots to the pages that need them."""
     context["default_mode"] = "auto"  # follow the system; the theme logs an error where this is empty
     if EXPLORABLE in context.get("body", ""):
-        for script in javascript_files():
-            app.add_js_file(f"{FOLDER}/{script.name}")
+        app.add_js_file(None, body=load_late(javascript_files(), context["pathto"](f"_static/{FOLDER}/", 1)))
     for shown, scripts in OF_THE_STUDY.items():
         if shown in context.get("body", ""):
             for script in scripts:
@@ -74,6 +78,38 @@ def choose_scripts(
         for name in ("status.js", "boot.js"):  # all else is loaded when the reader asks for it
             app.add_js_file(f"{LIVE_FOLDER}/{name}")
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
+
+
+def load_late(scripts: Iterable[Path], folder: str) -> str:
+    """A script that loads others, in their order, once the page stands: until then a static figure is there.
+
+    Args:
+        scripts: the files; a digest of each joins its address, so that no browser keeps an old one.
+        folder: address of the folder in which the book has them, ending in a slash.
+    """
+    addresses = [f"{folder}{script.name}?v={zlib.crc32(script.read_bytes()):08x}" for script in scripts]
+    return (
+        f"addEventListener('load', () => {{ for (const src of {json.dumps(addresses)}) "
+        "document.head.append(Object.assign(document.createElement('script'), { src, async: false })); });"
+    )
+
+
+def let_pages_go_first(
+    app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Let scripts wait until the page is read. They keep their order; inline ones need ``documentation_options.js``.
+
+    The search page stays as it is: what the theme adds there at the end needs the scripts of the head.
+    """
+    if pagename != "search":
+        context["script_files"] = [deferred(script) for script in context["script_files"]]
+
+
+def deferred(script: Any) -> Any:
+    """The script tag, told to wait; those of several pages are the same object."""
+    if not script.filename or "documentation_options" in str(script.filename):
+        return script
+    return type(script)(script.filename, priority=script.priority, **script.attributes | {"defer": "defer"})
 
 
 MENDED = {
@@ -189,6 +225,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_js_file(None, body=CHOOSE_THEME, priority=1)
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
+    app.connect("html-page-context", let_pages_go_first, priority=950)
     app.connect("html-page-context", mend_labels)
     app.connect("html-page-context", keep_full_stops)
     app.connect("autodoc-process-docstring", shield, priority=400)  # Napoleon is at 500

@@ -9,6 +9,7 @@ import pytest
 from docutils import nodes
 from docutils.utils import new_document
 from PIL import Image
+from sphinx.builders.html._assets import _JavaScript
 
 EXTENSIONS = Path(__file__).parents[2] / "book" / "_ext"
 
@@ -153,3 +154,34 @@ def test_a_full_stop_stays_with_its_doi(extension: ModuleType) -> None:
     context["body"] = '<a href="https://a.org/1234567">https://a.org/1234567</a>.'
     extension.keep_full_stops(None, "book/bibliography", "", context, None)
     assert context["body"].endswith('a.org/123<span style="white-space:nowrap">4567.</span></a>')
+
+
+def test_scripts_wait_for_the_page(extension: ModuleType) -> None:
+    """All but the one whose values inline scripts change; and each page has tags of its own."""
+    options, late, inline = (
+        _JavaScript(name, priority=500, **given)
+        for name, given in (("documentation_options.js", {}), ("book.js", {"x": "y"}), ("", {"body": "1"}))
+    )
+    context = {"script_files": [options, late, inline]}
+    extension.let_pages_go_first(None, "page", "", context, None)
+    assert [script.attributes for script in context["script_files"]] == [
+        {},
+        {"x": "y", "defer": "defer"},
+        {"body": "1"},
+    ]
+    assert late.attributes == {"x": "y"}
+    search = {"script_files": [options, late, inline]}
+    extension.let_pages_go_first(None, "search", "", search, None)
+    assert search["script_files"] == [options, late, inline]
+
+
+def test_late_scripts_come_in_order_and_anew_when_they_change(extension: ModuleType, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("first.js", "second.js")]
+    for file in files:
+        file.write_text("1")
+    text = extension.load_late(files, "../_static/x/")
+    assert 0 < text.index("../_static/x/first.js?v=") < text.index("../_static/x/second.js?v=")
+    assert text.startswith("addEventListener('load'")
+    assert "async: false" in text
+    files[0].write_text("2")
+    assert extension.load_late(files, "../_static/x/") != text
