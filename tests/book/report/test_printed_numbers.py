@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from inbounds.book.report import study_pages
+from inbounds.book.report import answers, study_pages
 from inbounds.book.report.over_all_robots import over_all_robots
 from tests.study.second import independent
 from tests.study.second.independent_statistics import (
@@ -156,28 +156,54 @@ def test_from_an_equal_start(page: str) -> None:
     assert compared == len(mine)
 
 
-@pytest.mark.parametrize(("page", "suffix"), [("which_policy", "-leads"), ("what_happened", "-{}-leads")])
-def test_the_differences_that_are_named(page: str, suffix: str) -> None:
-    """Robot, value and interval of each difference that leaves out 0, as printed."""
-    names, mine, seen = printed(page), {key[:4]: key[4] for key in law_rows()}, 0
+def as_printed(numbers: tuple[str, ...], found: Gap) -> None:
+    """Value and both ends, to the digits that a page shows."""
+    value, low, high = (float(number.replace("−", "-")) for number in numbers)
+    digit = 0.51 if abs(value) >= 100 else 0.051
+    assert value == pytest.approx(found.value, abs=digit)
+    assert (low, high) == pytest.approx((found.low, found.high), abs=found.error + digit)
+
+
+def test_the_differences_that_are_named() -> None:
+    """*Which policy?*: robot, value and interval of each final return's difference that leaves out 0."""
+    glued, mine, seen = printed("which_policy")["glued"], {key[:4]: key[4] for key in law_rows()}, 0
     for algorithm, law, endpoint in dict.fromkeys(key[:3] for key in mine):
-        name = f"{law}-{algorithm}{suffix.format(endpoint)}"
-        if name not in names["glued"] or (page == "which_policy" and endpoint == "area"):
+        name = f"{law}-{algorithm}-leads"
+        if name not in glued or endpoint != "final":
             continue
-        told = re.findall(r"(\w+) ([−\d.]+) \[([−\d.]+), ([−\d.]+)\] \((.+?)\)", names["glued"][name])
+        told = re.findall(r"(\w+) ([−\d.]+) \[([−\d.]+), ([−\d.]+)\] \((.+?)\)", glued[name])
         assert {each[0] for each in told} >= {
             key[3]
             for key, found in mine.items()
             if key[:3] == (algorithm, law, endpoint) and found.side and not found.near
         }
         for robot, *numbers, _ in told:
-            value, low, high = (float(number.replace("−", "-")) for number in numbers)
-            found = mine[algorithm, law, endpoint, robot]
-            digit = 0.51 if abs(value) >= 100 else 0.051
-            assert value == pytest.approx(found.value, abs=digit)
-            assert (low, high) == pytest.approx((found.low, found.high), abs=found.error + digit)
+            as_printed(tuple(numbers), mine[algorithm, law, endpoint, robot])
             seen += 1
     assert seen
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "trpo"])
+def test_the_rows_that_who_wins_leads_to(algorithm: str) -> None:
+    """*What happened*: every robot's row below a forest, each law and endpoint, or *not run*."""
+    page = answers.by_endpoint(printed("what_happened")["rows"], algorithm)._repr_html_()
+    mine, seen = {key[:4]: key[4] for key in law_rows()}, 0
+    for robot in ROBOTS:
+        row = re.search(rf'<tr id="{answers.place_of(robot, algorithm)}".*?</tr>', page, re.DOTALL)
+        assert row is not None
+        _, *cells = re.findall(r"<td[^>]*>(.*?)</td>", row[0], re.DOTALL)
+        keys = [
+            (algorithm, law, endpoint, robot) for endpoint in ENDPOINTS for law in ("beta", "logit-normal")
+        ]
+        for key, cell in zip(keys, cells, strict=True):
+            told = re.search(r"([−\d.]+)\s\[([−\d.]+),\s([−\d.]+)\]", cell)
+            assert (told is None) == (key not in mine), cell
+            if told:
+                as_printed(told.groups(), mine[key])
+                seen += 1
+            else:
+                assert "not run" in cell
+    assert seen == sum(key[0] == algorithm for key in mine)
 
 
 def test_a_quiet_start() -> None:
