@@ -70,10 +70,19 @@ def outside(asked: str, url: str) -> bool:
     return not asked.startswith((url.split("notebooks/")[0], "data:", "blob:"))
 
 
-def colours(canvas: Locator) -> int:
-    """How many colours a picture on the page has: a WebGL canvas itself has forgotten what it drew."""
-    picture = Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")
-    return len(picture.getcolors(picture.width * picture.height) or [])
+def colours(canvas: Locator, enough: int = 20) -> int:
+    """How many colours a picture on the page has: a WebGL canvas itself has forgotten what it drew.
+
+    A busy machine takes its time to draw, so a picture with too few is taken again.
+    """
+    count = 0
+    for _ in range(20):
+        picture = Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")
+        count = len(picture.getcolors(picture.width * picture.height) or [])
+        if count > enough:
+            break
+        canvas.page.wait_for_timeout(500)
+    return count
 
 
 def robot(page: Page) -> Locator:
