@@ -83,6 +83,8 @@ if [ -x .venv/bin/python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(finger
   exit 0
 fi
 
+[ ! -L .venv ] || fail ".venv is a link: setting up here would empty the environment it points to. Remove the link (rm .venv), and run the same command again"
+
 free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
 [ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
 
