@@ -1,9 +1,12 @@
-"""Binder and the dev container have what the project pins, as far as text can tell: no container is started here."""
+"""A machine is set up with what the project pins. Of Binder and the dev container only the texts are read."""
 
 import json
 import os
 import re
+import shutil
+import subprocess
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -86,3 +89,34 @@ def test_every_requirement_has_a_pin_that_fits_it() -> None:
     for each in wanted:
         if each.name != "inbounds":
             assert PINS[canonicalize_name(each.name)] in each.specifier, each
+
+
+def test_every_pin_installs_on_the_oldest_python() -> None:
+    oldest = re.fullmatch(r">=(3\.\d+)", PROJECT["requires-python"])[1] + ".0"
+    asks = {name: metadata.metadata(name)["Requires-Python"] for name in PINS if installed(name)}
+    assert len(asks) > 100
+    assert [name for name, text in asks.items() if text and oldest not in SpecifierSet(text)] == []
+
+
+def installed(name: str) -> bool:
+    """Whether the pinned version is what this environment has."""
+    try:
+        return Version(metadata.version(name)) == PINS[canonicalize_name(name)]
+    except metadata.PackageNotFoundError:
+        return False
+
+
+def test_a_linked_environment_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "tools").mkdir()
+    for name in ("pyproject.toml", "constraints.txt", "apt.txt", "tools/setup.sh"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "kept").touch()
+    (tmp_path / ".venv").symlink_to(elsewhere)
+    done = subprocess.run(
+        ["bash", "tools/setup.sh"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "is a link to" in done.stderr
+    assert (elsewhere / "kept").exists()

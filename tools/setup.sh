@@ -88,6 +88,7 @@ fi
 free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
 [ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
 
+[ ! -L .venv ] || fail ".venv is a link to $(readlink .venv), and what is there belongs to another folder: remove the link, then run the same command again"
 # A folder that was moved or copied brings commands that call the Python of the old place: start anew.
 at_home() { head -n 1 .venv/bin/pip 2>/dev/null | grep -qF "$PWD/.venv/"; }
 if ! at_home || ! .venv/bin/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
