@@ -22,20 +22,19 @@ find_python() {
 opengl_is_there() {
   [ "$(uname -s)" != Linux ] || "$1" -c '
 import ctypes, ctypes.util, sys
-for name in ("EGL", "OSMesa"):
+def there(name):
     try:
-        ctypes.CDLL(ctypes.util.find_library(name) or f"lib{name}.so.1")
-        sys.exit(0)
+        return bool(ctypes.CDLL(ctypes.util.find_library(name) or f"lib{name}.so.1"))
     except OSError:
-        pass
-sys.exit(1)'
+        return False
+sys.exit(not (there("EGL") and (there("OpenGL") or there("GL")) or there("OSMesa")))'
 }
 
 install_system_packages() {
   local python=$1; shift
   local missing=() package as_root=()
   command -v dpkg-query >/dev/null || {
-    opengl_is_there "$python" || fail "OpenGL for off-screen rendering is missing: install Mesa's EGL (on Debian the packages are: $(xargs < apt.txt))"
+    opengl_is_there "$python" || fail "OpenGL for off-screen rendering is missing: install Mesa's EGL and libOpenGL (on Debian the packages are: $(xargs < apt.txt))"
     return 0
   }
   for package in "$@"; do
@@ -88,7 +87,6 @@ fi
 free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
 [ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
 
-[ ! -L .venv ] || fail ".venv is a link to $(readlink .venv), and what is there belongs to another folder: remove the link, then run the same command again"
 # A folder that was moved or copied brings commands that call the Python of the old place: start anew.
 at_home() { head -n 1 .venv/bin/pip 2>/dev/null | grep -qF "$PWD/.venv/"; }
 if ! at_home || ! .venv/bin/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then

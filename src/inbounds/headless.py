@@ -14,10 +14,14 @@ import sys
 import traceback
 from collections.abc import Iterator
 
-PACKAGES_HINT = "sudo apt install libegl1 libgl1-mesa-dri"
+PACKAGES_HINT = "sudo apt install libegl1 libgl1-mesa-dri libopengl0"
 
 # In the order of preference: EGL draws on a GPU where there is one and in software elsewhere.
-_LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
+# Of each of a backend's groups one library is needed.
+_LIBRARIES = {
+    "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1")),
+    "osmesa": (("libOSMesa.so.8",),),
+}
 _SWITCHED_OFF = ("disable", "disabled", "off", "false", "0")
 
 
@@ -50,15 +54,15 @@ def choose_backend() -> str | None:
 
     Nothing happens on macOS and Windows, with a display, when the variable is already set, or once `mujoco` is
     imported (see `require_backend`). On a headless Linux machine EGL is taken, or OSMesa where EGL's
-    library cannot be loaded.
+    libraries cannot be loaded.
 
     Returns:
         The backend that was set, `"egl"` or `"osmesa"`; None where nothing was changed.
     """
     if os.environ.get("MUJOCO_GL") or "mujoco" in sys.modules or not _is_headless():
         return None
-    for backend, library in _LIBRARIES.items():
-        if _is_loadable(library):
+    for backend in _LIBRARIES:
+        if _has_libraries(backend):
             os.environ["MUJOCO_GL"] = backend
             return backend
     return None  # importing MuJoCo still works, and require_backend says what to install
@@ -78,7 +82,7 @@ def require_backend() -> None:
         raise RuntimeError(f"MUJOCO_GL={wanted} switches rendering off: unset it and start Python again.")
     if chosen in ("mujoco.egl", "mujoco.osmesa") or (chosen and not _is_headless()):
         return
-    if not any(_is_loadable(library) for library in _LIBRARIES.values()):
+    if not any(_has_libraries(backend) for backend in _LIBRARIES):
         raise RuntimeError(f"No library can draw without a display. Install one: {PACKAGES_HINT}")
     raise RuntimeError(
         "MuJoCo was imported without a backend that can draw without a display. Restart Python (in a notebook: restart "
@@ -90,6 +94,10 @@ def _is_headless() -> bool:
     """Return whether this is a Linux machine (or session) without a display."""
     has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     return sys.platform.startswith("linux") and not has_display
+
+
+def _has_libraries(backend: str) -> bool:
+    return all(any(_is_loadable(library) for library in group) for group in _LIBRARIES[backend])
 
 
 def _is_loadable(library: str) -> bool:
