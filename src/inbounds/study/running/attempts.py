@@ -32,7 +32,10 @@ class Settings:
     jobs: int | None = None
     """Processes at a time; None is one per core that this process may use."""
     nice: int = 0
-    """Added to the processes' niceness: 19 leaves the machine to everything else."""
+    """Added to the processes' niceness: 19 leaves the machine to everything else that this session runs.
+
+    Linux divides the processor between sessions first; beside those, ``echo 19 > /proc/PID/autogroup`` steps back.
+    """
     max_minutes: float | None = None
     """When time is up, running cells save a checkpoint and stop; no cell is started."""
     commit: bool = False
