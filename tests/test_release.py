@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 import inbounds
+from inbounds.book.pages import citing
 from tools import release_notes
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,6 +44,17 @@ def test_the_address_of_the_repository_is_the_configurations() -> None:
         "Issues": f"{url}/issues",
     }
     assert CITATION.get("repository-code", url) == url
+
+
+def test_the_page_that_tells_to_clone_has_the_configurations_address() -> None:
+    url, remark = REPOSITORY["url"], citing.cloning(REPOSITORY["url"])[-1]
+    preface = (ROOT / "book" / "preface.md").read_text(encoding="utf8")
+    assert "```{how-to-clone}" in preface
+    assert f"git clone {url}" in citing.cloning(url)
+    assert citing.PLACEHOLDER == release_notes.PLACEHOLDER
+    assert ("is a placeholder" in remark) == (citing.PLACEHOLDER in url)
+    told = [*ROOT.glob("*.md"), *ROOT.glob("book/*.md"), *ROOT.glob("notebooks/*.ipynb")]
+    assert [path.name for path in told if "git clone" in path.read_text(encoding="utf8")] == []
 
 
 def test_no_other_file_has_the_placeholder_in_an_address() -> None:

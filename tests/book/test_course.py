@@ -40,6 +40,9 @@ def test_what_is_shown_adds_up(count: int, minutes: int) -> None:
         announced = re.search(r"\*\*, ([\d +]+) planned minutes", session)
         assert announced
         assert sum(map(int, announced[1].split("+"))) == minutes
+        chapters = re.findall(r"\{doc\}`\.\./notebooks/(\w+)`", session.partition("\n")[0])
+        decks = re.findall(r"`(\w+)\.html`", session.partition("\n")[0])
+        assert decks == chapters  # `tools/slides.py` names a deck like its chapter
     assert "| – |" not in text
     assert "{glue" not in text  # a number of another page's notebook would not be found
     for target in re.findall(r"\{doc\}`(?:[^`<]*<)?([^`>]+)>?`", text):
@@ -55,6 +58,7 @@ def test_the_page_has_both_courses_and_nothing_typed() -> None:
         "inbounds doctor",
     ):
         assert command in PAGE
+    assert "`make slides` writes them into `_build/slides`" in PAGE
     for name in re.findall(r"`(build_\w+)\.ipynb`", PAGE):
         assert (ROOT / "tools" / "build" / f"{name.removeprefix('build_')}.ipynb").is_file()
 

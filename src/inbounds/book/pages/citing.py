@@ -1,10 +1,13 @@
-"""How the book is cited: `CITATION.cff` as BibTeX."""
+"""How the book is cited, `CITATION.cff` as BibTeX, and how its repository is cloned."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import yaml
+
+PLACEHOLDER = "your-name"
+"""Stands in the repository's address until it is published."""
 
 
 def bibtex(cff: Path, url: str = "") -> str:
@@ -39,3 +42,23 @@ def bibtex(cff: Path, url: str = "") -> str:
     }
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items() if value]
     return "\n".join(["@software{inbounds,", *lines, "}"])
+
+
+def cloning(url: str) -> list[str]:
+    """Return the command that clones the repository as lines of MyST Markdown, and what to put for a placeholder.
+
+    Args:
+        url: the repository's, from `_config.yml`.
+
+    Example:
+        >>> cloning("https://github.com/somebody/in-bounds")
+        ['```sh', 'git clone https://github.com/somebody/in-bounds', 'cd in-bounds', '```']
+    """
+    command = ["```sh", f"git clone {url}", f"cd {url.rpartition('/')[2]}", "```"]
+    if PLACEHOLDER not in url.split("/"):
+        return command
+    remark = (
+        f"`{PLACEHOLDER}` is a placeholder: this copy of the book names no public repository yet. Put the account "
+        "there from which you have it; if you were given a folder or an archive, begin in that folder."
+    )
+    return [*command, "", remark]

@@ -125,7 +125,7 @@ def course(count: int, notebooks: Path) -> Iterator[str]:
     Example:
         >>> from inbounds.study.store import ROOT
         >>> lines = list(course(8, ROOT / "notebooks"))  # in the project's folder
-        >>> lines[0]
+        >>> lines[0].partition(" (")[0]
         '**Session 1**, 90 planned minutes: {doc}`../notebooks/actions_have_bounds`'
     """
     length: Length = "short" if count == 4 else "long"
@@ -133,7 +133,8 @@ def course(count: int, notebooks: Path) -> Iterator[str]:
         plans = [plan_of(notebooks / f"{chapter}.ipynb") for chapter in chapters]
         total = " + ".join(str(plan.minutes(length)) for plan in plans)
         names = ", then ".join(f"{{doc}}`../notebooks/{plan.chapter}`" for plan in plans)
-        yield from (f"**Session {number}**, {total} planned minutes: {names}", "")
+        decks = ", ".join(f"`{plan.chapter}.html`" for plan in plans)
+        yield from (f"**Session {number}**, {total} planned minutes: {names} (slides: {decks})", "")
         yield from ("::::{dropdown} Its steps", "")
         for plan in plans:
             yield from (f"{{doc}}`../notebooks/{plan.chapter}`", "", "| Minutes | Step |", "|---|---|")

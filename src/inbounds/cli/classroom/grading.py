@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -19,9 +18,8 @@ from rich.markup import escape
 from rich.progress import track
 from rich.table import Table
 
+from inbounds.book.pages.graded import graders_in
 from inbounds.cli.errors import CommandError
-
-_GRADER = re.compile(r"\bgraders\.(\w+)\(")
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def graders_called(notebook: Path) -> list[str]:
         code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError("this file is no notebook: ask for it again") from error
-    return [name for source in code for name in _GRADER.findall(source)]
+    return [name for source in code for name in graders_in(source)]
 
 
 def grade(notebook: Path, seconds: float, gigabytes: float) -> list[Grade]:

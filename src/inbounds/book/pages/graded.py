@@ -1,0 +1,41 @@
+"""Which exercises `inbounds grade` judges: those below which a notebook calls one of its chapter's graders."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+_CALL = re.compile(r"\bgraders\.(\w+)\(")
+_START = re.compile(r"^(?:`{3,}|:{3,})\{exercise-start\}.*\n(?::(?!label)\w+:.*\n)*:label:[ \t]*(\S+)", re.M)
+
+
+def graders_in(source: str) -> list[str]:
+    """Return the names of the graders that some code calls, in order.
+
+    Example:
+        >>> graders_in("graders.loss(my_loss), graders.update(my_update)")
+        ['loss', 'update']
+    """
+    return _CALL.findall(source)
+
+
+def graders_of(notebook: Path) -> dict[str, list[str]]:
+    """Return the exercises of a notebook by label, each with the graders called between it and the next.
+
+    Example:
+        >>> from inbounds.study.store import ROOT
+        >>> found = graders_of(ROOT / "notebooks" / "ppo.ipynb")  # in the project's folder
+        >>> found["ex-10-implement"], found["ex-10-warmup"]
+        (['loss', 'update'], [])
+    """
+    found: dict[str, list[str]] = {}
+    label = ""
+    for cell in json.loads(notebook.read_text(encoding="utf8"))["cells"]:
+        source = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            for label in _START.findall(source):
+                found[label] = []
+        elif label:
+            found[label] += graders_in(source)
+    return found
