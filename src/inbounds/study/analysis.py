@@ -5,7 +5,8 @@
 
 What is missing stays missing: a function of cells that are not all finished returns None in their place. A seed that
 diverged counts with its last return, `Estimate.diverged` says how many do, and `without_diverged=True` repeats
-everything without them. Every number has a random generator of its own, seeded by its name.
+everything without them. Means and their differences have the intervals of `statistics.printed`, everything else a
+random generator of its own, seeded by its name.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from inbounds.study.cell import ROBOTS, STUDY_VERSION
 from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate, Profile
 from inbounds.study.statistics.intervals import StatisticName
+from inbounds.study.statistics.seeds import countable
 from inbounds.study.statistics.settings import LAST_EVALUATIONS
 
 ENDPOINTS: Mapping[str, str] = MappingProxyType(
@@ -119,7 +121,7 @@ def curve(outcome: Outcome) -> Estimate | None:
         >>> band.value.shape, bool((band.low < band.high).all())
         ((500,), True)
     """
-    if _countable(outcome.returns[:, 0]) < 2:
+    if countable(outcome.returns[:, 0]) < 2:
         return None
     estimate = statistics.learning_curve(
         outcome.returns, generator_for("curve", outcome.cell.id), missing="exclude"
@@ -140,10 +142,9 @@ def estimate(
         (10, True)
     """
     values = scores(outcome, endpoint, without_diverged=without_diverged)
-    if _countable(values) < 2:
+    if countable(values) < 2:
         return None
-    rng = generator_for("estimate", outcome.cell.id, endpoint, statistic, without_diverged)
-    found = statistics.bootstrap(values, rng, statistic=statistic, missing="exclude")
+    found = statistics.mean_of(values, statistic=statistic, missing="exclude")
     return found if without_diverged else marked(found, outcome)
 
 
@@ -156,17 +157,21 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
         >>> sorted(by_way(outcomes.finished["standard-hopper-ppo-beta"]))
         ['mean', 'median', 'mode', 'sample']
     """
-    mean = functools.partial(statistics.bootstrap, statistic="mean", missing="exclude")
     return {
-        way: marked(mean(values, generator_for("way", outcome.cell.id, way)), outcome)
-        if _countable(values) >= 2
+        way: marked(statistics.mean_of(values, missing="exclude"), outcome)
+        if countable(values) >= 2
         else None
         for way, values in outcome.ways.items()
     }
 
 
 def differences(
-    outcomes: Outcomes, contrast: Contrast, endpoint: str, *, without_diverged: bool = False
+    outcomes: Outcomes,
+    contrast: Contrast,
+    endpoint: str,
+    *,
+    without_diverged: bool = False,
+    as_planned: bool = False,
 ) -> dict[str, Comparison]:
     """Compare two columns robot by robot: difference of means, p-value, p-value after Holm over six robots.
 
@@ -175,6 +180,7 @@ def differences(
         contrast: what is compared.
         endpoint: a key of `ENDPOINTS`.
         without_diverged: leave out seeds that diverged.
+        as_planned: with the protocol's own intervals, of 5000 resamples; the p-values are the same.
 
     Returns:
         A comparison for each of the six robots; where a cell is missing, one without a difference.
@@ -188,11 +194,11 @@ def differences(
     """
     first, second = (_scores_by_robot(outcomes, c, endpoint, without_diverged) for c in contrast.columns)
     rng = generator_for("difference", *contrast, endpoint, without_diverged)
-    rows = statistics.compare(first, second, rng, environments=ROBOTS, statistic="mean", missing="exclude")
-    if without_diverged:
-        return rows
+    planned = functools.partial(statistics.compare, statistic="mean", missing="exclude")
+    compare = planned if as_planned else statistics.compared
+    rows = compare(first, second, rng, environments=ROBOTS)
     for robot, row in rows.items():
-        if row.difference is not None:
+        if row.difference is not None and not without_diverged:
             pair = [o for c in contrast.columns if (o := outcomes.find(c, robot)) is not None]
             rows[robot] = dataclasses.replace(row, difference=marked(row.difference, *pair))
     return rows
@@ -210,16 +216,14 @@ def change(outcomes: Outcomes, outcome: Outcome, endpoint: str) -> Estimate | No
     """
     cell = outcome.cell
     plain = outcomes.find(Column(cell.arm, cell.algorithm, cell.family, cell.variant).baseline, cell.robot)
-    if plain is None or min(_countable(scores(o, endpoint)) for o in (outcome, plain)) < 2:
+    if plain is None or min(countable(scores(o, endpoint)) for o in (outcome, plain)) < 2:
         return None
-    found = statistics.difference(
-        scores(outcome, endpoint),
-        scores(plain, endpoint),
-        generator_for("change", cell.id, endpoint),
-        statistic="mean",
-        missing="exclude",
-    )
-    return marked(found, outcome, plain)
+    return difference_of(outcome, plain, endpoint)
+
+
+def difference_of(first: Outcome, second: Outcome, endpoint: str) -> Estimate:
+    """Return the first cell's mean minus the second's, with its interval and the count of diverged seeds."""
+    return marked(statistics.minus(scores(first, endpoint), scores(second, endpoint)), first, second)
 
 
 def references(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
@@ -335,13 +339,9 @@ def _scores_by_robot(
     for robot in ROBOTS:
         if (outcome := outcomes.find(column, robot)) is not None:
             values = scores(outcome, endpoint, without_diverged=without_diverged)
-            if _countable(values) >= 2:
+            if countable(values) >= 2:
                 found[robot] = values
     return found
-
-
-def _countable(values: Floats) -> int:
-    return int(np.isfinite(values).sum())
 
 
 def marked(estimate: Estimate, *outcomes: Outcome) -> Estimate:

@@ -45,10 +45,7 @@ def pooled_estimate(cells: Sequence[Outcome], endpoint: str) -> Estimate | None:
     if len(cells) == 1:
         return estimate(cells[0], endpoint)
     values = np.concatenate([scores(cell, endpoint) for cell in cells])
-    key = ("estimate", *(cell.cell.id for cell in cells), endpoint)
-    return marked(
-        statistics.bootstrap(values, generator_for(*key), statistic="mean", missing="exclude"), *cells
-    )
+    return marked(statistics.mean_of(values, missing="exclude"), *cells)
 
 
 __all__ = ["pooled_curve", "pooled_estimate"]

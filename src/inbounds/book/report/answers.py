@@ -13,7 +13,7 @@ from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
-from inbounds.book.report.many_resamples import of as of
+from inbounds.book.report.rows import of as of
 from inbounds.book.report.words import HEADS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS

@@ -1,7 +1,7 @@
 """The first study's comparisons of two families, as a forest: what its protocol finds, and what of it is fragile.
 
-The protocol corrects each comparison over the six robots, with 5 000 resamples an interval. Here an interval has
-100 000, so that the generator's luck does not move its end across 0 (`results/HISTORY.md` has the date and what
+The protocol corrects each comparison over the six robots, with 5 000 resamples an interval. What is printed has
+100 000, so that the generator's luck does not move an end across 0 (`results/HISTORY.md` has the date and what
 changed), and a finding that Holm's correction over *all* tests of an arm and endpoint would not make is called fragile.
 
     rows = compared(study_pages.shipped(), "standard")
@@ -18,8 +18,7 @@ import numpy as np
 from inbounds.book.report import html
 from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
-from inbounds.book.report.many_resamples import difference_of
-from inbounds.book.report.many_resamples import of as of
+from inbounds.book.report.rows import of as of
 from inbounds.book.report.words import pair_name, title_of
 from inbounds.study import analysis, statistics
 from inbounds.study.analysis import CONTRASTS, Contrast
@@ -91,21 +90,14 @@ def compared(outcomes: Outcomes, arm: str, endpoints: Sequence[str] = tuple(ENDP
     contrasts = [each for each in CONTRASTS if each.arm == arm]
     rows = []
     for endpoint in endpoints:
-        known = {c: analysis.differences(outcomes, c, endpoint) for c in contrasts}
+        planned = {c: analysis.differences(outcomes, c, endpoint, as_planned=True) for c in contrasts}
+        printed = {c: analysis.differences(outcomes, c, endpoint) for c in contrasts}
         places = [(c, robot) for c in contrasts for robot in ROBOTS]
-        together = statistics.holm([known[c][robot].p_value for c, robot in places])
+        together = statistics.holm([planned[c][robot].p_value for c, robot in places])
         for (contrast, robot), p in zip(places, together, strict=True):
-            comparison = known[contrast][robot]
-            if comparison.difference is not None:
-                again = _again(outcomes, contrast, robot, endpoint)
-                rows.append(Compared(contrast, endpoint, robot, again, comparison, float(p)))
+            if (gap := printed[contrast][robot].difference) is not None:
+                rows.append(Compared(contrast, endpoint, robot, gap, planned[contrast][robot], float(p)))
     return rows
-
-
-def _again(outcomes: Outcomes, contrast: Contrast, robot: str, endpoint: str) -> Estimate:
-    """Return a difference with many resamples."""
-    first, second = (found for c in contrast.columns if (found := outcomes.find(c, robot)) is not None)
-    return difference_of(first, second, endpoint, "many resamples", *contrast, robot, endpoint)
 
 
 def told(rows: Sequence[Compared]) -> str:

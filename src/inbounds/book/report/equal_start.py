@@ -15,8 +15,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from inbounds.book.report.many_resamples import difference_of
 from inbounds.study import statistics
+from inbounds.study.analysis import difference_of
 from inbounds.study.grid import AFTERWARDS, FREE, ROBOTS, second_cells
 from inbounds.study.outcomes import Column, Outcome, Outcomes
 from inbounds.study.second import GAUSSIAN, MARGINS, primary
@@ -214,7 +214,7 @@ def loud_starts(outcomes: Outcomes) -> list[Evidence]:
             "trpo",
             "logit-normal",
             endpoint,
-            difference_of(pair[0], pair[1], endpoint, "both loud", robot, endpoint),
+            difference_of(pair[0], pair[1], endpoint),
             study=1,
         )
         for robot in ROBOTS
@@ -295,7 +295,7 @@ def _minus(
     if first is None or second is None:
         return None
     cell = first.cell
-    told = difference_of(first, second, endpoint, "equal start", cell.id, second.cell.id, endpoint)
+    told = difference_of(first, second, endpoint)
     return Evidence(cell.robot, cell.algorithm, cell.family, endpoint, told, 1, as_it_comes=as_it_comes)
 
 

@@ -1,7 +1,6 @@
 """Means over seeds with their intervals, as the chapters on the study write them beside the protocol's tables.
 
-The numbers that `results/PROTOCOL.md` lists have generators of their own (`inbounds.study.analysis`). What the chapters
-look at besides is exploratory, and each of its intervals is resampled from seed 0, so that it is the same tomorrow.
+A mean and a difference of means have the interval of `inbounds.study.statistics.printed`, on every page the same.
 
     mean_of(scores(outcome, "final"))
     minus(scores(first, "final"), scores(second, "final"))
@@ -17,41 +16,12 @@ from numpy.typing import ArrayLike
 from inbounds.book.drawing import figures
 from inbounds.learning import TrainedPolicy, load_policy
 from inbounds.study.outcomes import Outcome, Outcomes
-from inbounds.study.statistics import Estimate, bootstrap, difference
-from inbounds.study.statistics.settings import RESAMPLES
+from inbounds.study.statistics import bootstrap, mean_of, minus
+
+__all__ = ["draw", "final_policies", "mean_of", "minus"]
 
 BAND_RESAMPLES = 1000
 """Of a curve's band, which nobody reads to the last digit."""
-
-MANY = 100_000
-"""Resamples for an interval that ends near zero: with the protocol's number, zero may lie inside for one seed of the
-resampling and outside for the next."""
-
-
-def mean_of(values: ArrayLike) -> Estimate:
-    """Return the mean over seeds of numbers `[S]`, with its interval.
-
-    Example:
-        >>> mean_of([1.0, 2.0, 3.0]).value.item()
-        2.0
-    """
-    return bootstrap(np.asarray(values, np.float64), np.random.default_rng(0), statistic="mean")
-
-
-def minus(first: ArrayLike, second: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
-    """Return the difference of the means of two independent groups of seeds, with its interval.
-
-    Args:
-        first: `[S]`.
-        second: `[S']`.
-        resamples: of each group; `MANY` where an interval ends near zero.
-
-    Example:
-        >>> minus([2.0, 3.0, 4.0], [1.0, 1.0, 4.0]).value.item()
-        1.0
-    """
-    rng = np.random.default_rng(0)
-    return difference(first, second, rng, statistic="mean", resamples=resamples, missing="exclude")
 
 
 def draw(ax: Any, family: str, values: ArrayLike, x: ArrayLike | None = None, **changed: Any) -> None:

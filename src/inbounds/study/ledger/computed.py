@@ -17,13 +17,12 @@ from scipy.special import expit, logit
 from inbounds.distributions import LogitNormal
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, Trainer, preset, trpo
 from inbounds.learning.training import one_thread
-from inbounds.study.analysis import generator_for
-from inbounds.study.ledger.evidence import combination, side
+from inbounds.study.ledger.evidence import side
 from inbounds.study.ledger.half_of_a_gap import half_left
 from inbounds.study.ledger.untrained_returns import LOUD, untrained
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Floats, Outcomes
-from inbounds.study.statistics import Estimate
+from inbounds.study.statistics import Estimate, combination
 from inbounds.study.statistics.settings import LEVEL
 
 EXACT = 1e-6
@@ -133,7 +132,7 @@ def loud_starts(robots: Sequence[str]) -> Evidence:
                 [untrained(family, robot, std) for family in ("logit-normal", "gaussian")]
                 for std in (LOUD, None)
             )
-            found.append(half_left(robot, loud, default, ("loud", robot), claimed=True))
+            found.append(half_left(robot, loud, default, claimed=True))
         return found
 
     return find
@@ -148,24 +147,20 @@ def bill_of_leaving(robot: str) -> Evidence:
     def find(_: Outcomes) -> list[Statement]:
         logit_normal, clipped = (untrained(family, robot) for family in ("logit-normal", "gaussian"))
         drawn = untrained("gaussian", robot, mode="raw")
-        return [
-            half_left(
-                robot, [clipped, drawn], [logit_normal, drawn], ("bill", robot), claimed=True, one_base=True
-            )
-        ]
+        return [half_left(robot, [clipped, drawn], [logit_normal, drawn], claimed=True, one_base=True)]
 
     return find
 
 
 def sampled_error(_: Outcomes) -> list[Statement]:
     """State that the sampled Fisher-vector product is off: its relative error, over seeds. For: above `OFF`."""
-    error = _over(_fisher_routes()[0], "error")
+    error = combination([_fisher_routes()[0]], [1])
     return [Statement("relative error of the sampled product", side(error, 1, OFF), error, digits=3)]
 
 
 def sampled_time(_: Outcomes) -> list[Statement]:
     """State that the sampled product takes longer: its processor time over the closed form's. For: above 1."""
-    ratio = _over(_fisher_routes()[1], "ratio")
+    ratio = combination([_fisher_routes()[1]], [1])
     return [
         Statement("its processor time over that of the closed form", side(ratio, 1, 1.0), ratio, digits=2)
     ]
@@ -188,10 +183,6 @@ def _fisher_routes() -> tuple[Floats, Floats]:
         error = ((sampled - exact).norm(dim=1) / exact.norm(dim=1)).double().numpy()
         ratio = np.array([_seconds(routes[1], vector) / _seconds(routes[0], vector) for _ in range(_REPEATS)])
     return error, ratio
-
-
-def _over(values: Floats, name: str) -> Estimate:
-    return combination([values], [1], generator_for("ledger", "fisher", name))
 
 
 def _seconds(route: Callable[[], trpo.Product], vector: torch.Tensor) -> float:

@@ -17,9 +17,7 @@ from inbounds.study.analysis import Contrast, generator_for
 from inbounds.study.grid import ROBOTS, Cell, select
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
-from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.statistics.intervals import check_bootstrap, limits, resample
-from inbounds.study.statistics.settings import LEVEL, RESAMPLES
+from inbounds.study.statistics import Comparison, Estimate, combination
 from inbounds.study.words import verdict
 
 MARGIN = 0.1
@@ -38,40 +36,6 @@ def groups_of(outcomes: Outcomes, places: Sequence[tuple[Column, str]], endpoint
     cells = [outcomes.find(column, robot) for column, robot in places]
     groups = [seeds_of(cell, endpoint) for cell in cells if cell is not None]
     return groups if len(groups) == len(places) and all(np.isfinite(x).sum() > 1 for x in groups) else None
-
-
-def combination(groups: Sequence[Floats], weights: Sequence[float], rng: np.random.Generator) -> Estimate:
-    """Estimate Σ weight · mean over independent groups of seeds, with the protocol's kind of interval.
-
-    Args:
-        groups: `[S]` each; seeds without a finite number are left out and counted.
-        weights: one per group.
-        rng: source of the resamples.
-
-    Returns:
-        The estimate, with the degrees of freedom of Welch (1947); for weights 1 and −1 that of
-        `statistics.difference`.
-
-    Example:
-        >>> groups = [np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 4.0])]
-        >>> combination(groups, [1.0, -0.5], np.random.default_rng(0)).value.item()
-        1.0
-    """
-    check_bootstrap(LEVEL, RESAMPLES, "expanded")
-    found = [statistics.seeds.finite_seeds(group, "exclude") for group in groups]
-    kept, lost = [each for each, _ in found], sum(gone for _, gone in found)
-    drawn = [resample(x, "mean", rng.integers(len(x), size=(RESAMPLES, len(x)))) for x in kept]
-    replicates = sum((w * each for w, each in zip(weights, drawn, strict=True)), start=np.zeros(RESAMPLES))
-    parts = np.array([w**2 * x.var(ddof=1) / len(x) for w, x in zip(weights, kept, strict=True)])
-    sizes = np.array([len(x) for x in kept])
-    freedom = (
-        parts.sum() ** 2 / (parts**2 / (sizes - 1)).sum() if parts.sum() else float(sizes.sum() - len(kept))
-    )
-    low, high = limits(replicates, LEVEL, "expanded", int(sizes.min()), freedom)
-    value = np.asarray(sum(w * x.mean() for w, x in zip(weights, kept, strict=True)))
-    ceiling = statistics.coverage_ceiling(len(kept[0])) if len(kept) == 1 else 1.0
-    name = "difference of means"
-    return Estimate(value, low, high, int(sizes.min()), lost, LEVEL, name, ceiling=ceiling)
 
 
 def side(estimate: Estimate, sign: int = 1, edge: float = 0.0) -> State:
@@ -122,7 +86,7 @@ def _compared(outcomes: Outcomes, contrast: Contrast, endpoint: str) -> dict[str
         for column in contrast.columns
     )
     rng = generator_for("difference", *contrast, START)
-    return statistics.compare(first, second, rng, environments=ROBOTS, statistic="mean", missing="exclude")
+    return statistics.compared(first, second, rng, environments=ROBOTS)
 
 
 def _of_comparison(about: str, row: Comparison, sign: int, best: float) -> Statement:
@@ -209,7 +173,7 @@ def _change(outcomes: Outcomes, cell: Cell, endpoint: str) -> Estimate | None:
         return analysis.change(outcomes, outcome, endpoint)
     column = Column(cell.arm, cell.algorithm, cell.family, cell.variant)
     groups = groups_of(outcomes, [(column, cell.robot), (column.baseline, cell.robot)], START)
-    return None if groups is None else combination(groups, [1, -1], generator_for("ledger", cell.id, START))
+    return None if groups is None else combination(groups, [1, -1])
 
 
 def _name(cell: Cell) -> str:
@@ -228,7 +192,7 @@ def gaps(pairs: Sequence[tuple[Column, Column]], robot: str) -> Evidence:
             if groups is None:
                 found.append(Statement(about, "missing"))
                 continue
-            gap = combination(groups, [1, -1], generator_for("ledger", *first, *second, robot))
+            gap = combination(groups, [1, -1])
             found.append(Statement(about, side(gap), gap))
         return found
 
@@ -246,7 +210,7 @@ def learns(column: Column, sign: int = 1) -> Evidence:
                 found.append(Statement(robot, "missing"))
                 continue
             rise = seeds_of(outcome, "final") - seeds_of(outcome, START)
-            gap = combination([rise], [1], generator_for("ledger", outcome.cell.id, "rise"))
+            gap = combination([rise], [1])
             found.append(Statement(robot, side(gap) if sign > 0 else _opposite(side(gap)), gap))
         return found
 
@@ -274,7 +238,7 @@ def exceeds(patterns: Sequence[str], measure: Sequence[str], edge: float, digits
             if np.isfinite(last.mean(1)).sum() < 2:
                 found.append(Statement(_name(cell), "missing"))
                 continue
-            level = combination([last.mean(1)], [1], generator_for("ledger", cell.id, *measure))
+            level = combination([last.mean(1)], [1])
             found.append(Statement(_name(cell), side(level, 1, edge), level, digits=digits))
         return found
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from inbounds.study.analysis import generator_for
-from inbounds.study.ledger.evidence import combination, groups_of, side
+from inbounds.study.ledger.evidence import groups_of, side
 from inbounds.study.ledger.verdicts import Evidence, Statement
 from inbounds.study.outcomes import Column, Floats, Outcomes
+from inbounds.study.statistics import combination
 
 
 def half_remains(
@@ -29,8 +29,7 @@ def half_remains(
             left, gap = (
                 groups_of(outcomes, [(column, robot) for column in pair], endpoint) for pair in (now, before)
             )
-            name = (*now[0], *now[1], *before[0], *before[1], robot, endpoint)
-            found.append(half_left(robot, left, gap, name, claimed=claimed, one_base=now[1] == before[1]))
+            found.append(half_left(robot, left, gap, claimed=claimed, one_base=now[1] == before[1]))
         return found
 
     return find
@@ -40,7 +39,6 @@ def half_left(
     about: str,
     now: Sequence[Floats] | None,
     before: Sequence[Floats] | None,
-    name: Sequence[str],
     *,
     claimed: bool,
     one_base: bool = False,
@@ -58,18 +56,17 @@ def half_left(
         about: of the statement.
         now: a and b, `[S]` each; None where they are missing.
         before: c and d, likewise.
-        name: of its generators.
         claimed: whether the claim is that so much is left.
         one_base: b and d are one group, whose seeds are drawn once.
     """
     if before is None:
         return Statement(about, "missing")
-    gap = combination(before, [1, -1], generator_for("ledger", *name, "gap"))
+    gap = combination(before, [1, -1])
     if not gap.low > 0:
         return Statement(f"{about} (gap)", "moot", gap)
     if now is None:
         return Statement(about, "missing")
     (a, b), (c, d) = now, before
     parts, weights = ([a, b, c], [1, -0.5, -0.5]) if one_base else ([a, b, c, d], [1, -1, -0.5, 0.5])
-    rest = combination(parts, weights, generator_for("ledger", *name, "half"))
+    rest = combination(parts, weights)
     return Statement(about, side(rest, 1 if claimed else -1), rest)

@@ -10,6 +10,7 @@ and `missing`, and the figures show both.
 * `endpoints` — from learning curves to one number per seed: area, final, normalised score.
 * `intervals` — means and interquartile means over seeds with bootstrap intervals.
 * `covering` — what an interval covers, and what few seeds cannot.
+* `printed` — means and differences of means with the one interval that they have on every page.
 * `comparisons` — differences of two policies, permutation tests, Holm.
 * `two_one_sided` — whether two policies differ by less than a margin.
 * `aggregates` — over environments: IQM, probability of improvement, performance profiles (Agarwal et al. 2021).
@@ -43,6 +44,7 @@ from inbounds.study.statistics.intervals import (
     interquartile_mean,
     learning_curve,
 )
+from inbounds.study.statistics.printed import combination, compared, mean_of, minus
 from inbounds.study.statistics.resolution import power, smallest_detectable_effect
 from inbounds.study.statistics.seeds import MissingSeedError
 
@@ -56,7 +58,9 @@ __all__ = [
     "area_under_curve",
     "bootstrap",
     "carry_forward",
+    "combination",
     "compare",
+    "compared",
     "coverage",
     "coverage_ceiling",
     "difference",
@@ -65,6 +69,8 @@ __all__ = [
     "holm",
     "interquartile_mean",
     "learning_curve",
+    "mean_of",
+    "minus",
     "normalize_scores",
     "performance_profile",
     "permutation_test",

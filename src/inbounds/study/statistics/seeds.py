@@ -53,3 +53,13 @@ def finite_seeds(values: ArrayLike, missing: Missing = "raise", at_least: int = 
             f"{there.sum()} of {len(scores)} seeds have a finite score, at least {at_least} are needed: run more seeds"
         )
     return scores[there], int((~there).sum())
+
+
+def countable(values: Floats) -> int:
+    """Return how many seeds have a finite number.
+
+    Example:
+        >>> countable(np.array([1.0, np.nan]))
+        1
+    """
+    return int(np.isfinite(values).sum())
