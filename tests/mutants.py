@@ -588,9 +588,9 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "differences are of IQMs",
-        "study/analysis.py",
-        'environments=ROBOTS, statistic="mean"',
-        'environments=ROBOTS, statistic="iqm"',
+        "study/statistics/printed.py",
+        'return difference(first, second, rng, statistic="mean"',
+        'return difference(first, second, rng, statistic="iqm"',
         "tests/study/test_analysis.py::test_differences_are_of_means_and_corrected_over_six_robots",
     ),
     Mutant(
@@ -735,7 +735,7 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "a variance is weighted once",
-        "study/ledger/evidence.py",
+        "study/statistics/printed.py",
         "np.array([w**2 * x.var",
         "np.array([abs(w) * x.var",
         "tests/study/test_ledger.py::test_a_weight_scales_a_group",
