@@ -979,6 +979,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/own_task/test_comparing.py::test_leads_are_paired_by_day_and_resampled_by_what_is_random",
     ),
     Mutant(
+        "no greenhouse is ever too hot",
+        "book/own_task/greenhouse.py",
+        "terminated = (inside <= COLD) | (inside >= HOT)",
+        "terminated = inside <= COLD",
+        "tests/book/own_task/test_greenhouse.py::test_the_crop_is_lost_at_5_and_at_35_degrees",
+    ),
+    Mutant(
         "a finding does not wait for all of its seeds",
         "book/report/equal_start.py",
         "tested = evidence.whole and evidence.p_adjusted < SIGNIFICANCE",

@@ -39,6 +39,21 @@ def test_a_day_lasts_a_day_and_ends_early_where_the_crop_is_lost() -> None:
     assert any(frozen[:40])
 
 
+def test_the_crop_is_lost_at_5_and_at_35_degrees() -> None:
+    envs = house.GreenhouseBatch(200)
+    envs.reset(seed=list(range(200)))
+    heats, cools = np.stack([np.linspace(2, 8, 100), np.zeros(100)], -1), np.tile([-2.0, 1.0], (100, 1))
+    lost, kept = np.zeros(0), np.zeros(0)
+    for _ in range(house.DAY - 1):
+        obs, _, terminated, _, info = envs.step(np.float32(np.concatenate([heats, cools])))
+        inside = (
+            info["final_obs"][:, 0] if terminated.any() else obs[:, 0]
+        )  # a lost crop's greenhouse begins anew
+        lost, kept = np.append(lost, inside[terminated]), np.append(kept, inside[~terminated])
+    assert 4.9 < lost[lost < 20].max() <= 5 < kept.min() < 5.1
+    assert 34.9 < kept.max() < 35 <= lost[lost > 20].min() < 35.1
+
+
 def test_the_planner_is_no_worse_than_any_rule() -> None:
     days = range(20)
     planned = house.planned(days)

@@ -34,6 +34,7 @@ from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
 from inbounds.book.drawing import figures
+from inbounds.book.drawing.variables import color_variables
 
 _HERE = Path(__file__).parent
 
@@ -202,18 +203,9 @@ def _with_fixed_ids(item: Any, name: str) -> Any:
 @functools.cache
 def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
     """Return the style of an explorable, with the colours of its curves for both themes."""
-    curves = {
-        "light": {name: look.color for name, look in looks},
-        "dark": {name: look.color_on_dark for name, look in looks},
-    }
-    blocks = []
-    for selector, palette in (
-        ("", _COLORS["light"] | curves["light"]),
-        ('[data-theme="dark"]', _COLORS["dark"] | curves["dark"]),
-    ):
-        variables = " ".join(f"--inbounds-{key}: {value};" for key, value in palette.items())
-        blocks.append(f".inbounds-explorable{selector} {{ {variables} }}")
-    return "\n".join([*blocks, (_HERE / "explorables.css").read_text(encoding="utf-8")])
+    dark = '{}[data-theme="dark"]'
+    variables = color_variables(".inbounds-explorable", "inbounds", _COLORS, dict(looks), dark)
+    return "\n".join([variables, (_HERE / "explorables.css").read_text(encoding="utf-8")])
 
 
 @functools.cache

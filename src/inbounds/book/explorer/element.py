@@ -17,6 +17,7 @@ import numpy as np
 
 from inbounds.book.drawing.alt_text import svg_bytes
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.drawing.variables import color_variables
 from inbounds.book.explorables.frame import DASHES
 from inbounds.book.explorer.choices import choices, kept_of
 from inbounds.book.report.arms import Part
@@ -154,9 +155,4 @@ def variables(selector: str) -> str:
         >>> variables(".a").count("--explorer-beta:")
         2
     """
-    blocks = []
-    for theme, scope in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
-        families = {n: look.color if theme == "light" else look.color_on_dark for n, look in LOOKS.items()}
-        colors = " ".join(f"--explorer-{key}: {value};" for key, value in (_COLORS[theme] | families).items())
-        blocks.append(f"{scope}{selector} {{ {colors} }}")
-    return "\n".join(blocks)
+    return color_variables(selector, "explorer", _COLORS)

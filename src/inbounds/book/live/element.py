@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.drawing.variables import color_variables
 from inbounds.book.live.export import NAMES
 from inbounds.book.templates import macros
 from inbounds.study.grid import ROBOTS, THESIS
@@ -113,12 +114,6 @@ def style_sheet() -> str:
         >>> "--inbounds-live-beta: #1F8277" in style_sheet()
         True
     """
-    blocks = []
-    for theme, selector in (("light", ""), ("dark", 'html[data-theme="dark"] ')):
-        families = {
-            name: LOOKS[name].color if theme == "light" else LOOKS[name].color_on_dark for name in NAMES
-        }
-        colors = _COLORS[theme] | families
-        variables = " ".join(f"--inbounds-live-{key}: {value};" for key, value in colors.items())
-        blocks.append(f"{selector}.inbounds-live-robot {{ {variables} }}")
-    return "\n".join([*blocks, (_HERE / "live.css").read_text(encoding="utf8")])
+    families = {name: LOOKS[name] for name in NAMES}
+    variables = color_variables(".inbounds-live-robot", "inbounds-live", _COLORS, families)
+    return "\n".join([variables, (_HERE / "live.css").read_text(encoding="utf8")])
