@@ -17,13 +17,21 @@
     return node.matches("figure") ? "Figure" : `Formula ${number}`.trim();
   };
 
-  /* What scrolls is a stop of the Tab key and has a name; what does not is none. */
+  /* A table has a name. What scrolls is a stop of the Tab key and has one, too; what does not is none. */
   const update = (node) => {
+    if (node.matches("table") && !node.caption) node.setAttribute("aria-label", label(node));
     if (node.scrollWidth <= node.clientWidth) return node.removeAttribute("tabindex");
     node.tabIndex = 0;
-    if (!node.caption) node.setAttribute("aria-label", label(node));
+    if (!node.matches("table")) node.setAttribute("aria-label", label(node));
     if (!node.matches("table, figure")) node.role = "group";
   };
+
+  /* What only draws is not read out: the theme's icons, and the arrows that its script puts beside folds. */
+  const hush = () => {
+    for (const icon of document.querySelectorAll("i[class*='fa-'], svg.tb-icon")) icon.setAttribute("aria-hidden", "true");
+  };
+  hush();
+  addEventListener("load", hush);
 
   /* Two buttons of the header show more than their labels say: "Search this book", and which mode is on. */
   document.querySelectorAll(".search-button-field").forEach((button) => button.removeAttribute("aria-label"));
