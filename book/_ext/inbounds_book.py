@@ -3,7 +3,8 @@
 * sphinx-thebe's scripts are dropped. Jupyter Book 1.x puts them on every page, even with thebe off, where they
   throw ``THEBE_JS_URL has already been declared``.
 * No script holds up a page: what a page needs runs once the page is read (see ``let_pages_go_first``), BokehJS and the
-  explorables once it stands (see ``load_late``); the search's index is loaded by the search alone (``_templates``).
+  explorables when the reader comes near one (``_static/load_explorables.js``); the search's index is loaded by the
+  search alone (``_templates``).
 * BokehJS and the explorables' own scripts are copied into the book, and loaded on the pages that show one. A page with
   a live robot loads two small scripts, which load the rest when the reader asks for it; one with a part of
   the study to choose from loads that part's own.
@@ -69,7 +70,8 @@ def choose_scripts(
     """Drop thebe's scripts from every page; add those of explorables and live robots to the pages that need them."""
     context["default_mode"] = "auto"  # follow the system; the theme logs an error where this is empty
     if EXPLORABLE in context.get("body", ""):
-        app.add_js_file(None, body=load_late(javascript_files(), context["pathto"](f"_static/{FOLDER}/", 1)))
+        wanted = addresses(javascript_files(), context["pathto"](f"_static/{FOLDER}/", 1))
+        app.add_js_file("load_explorables.js", **{"data-scripts": json.dumps(wanted)})
     for shown, scripts in OF_THE_STUDY.items():
         if shown in context.get("body", ""):
             for script in scripts:
@@ -80,18 +82,14 @@ def choose_scripts(
     context["script_files"] = [script for script in context["script_files"] if not is_thebe(script)]
 
 
-def load_late(scripts: Iterable[Path], folder: str) -> str:
-    """A script that loads others, in their order, once the page stands: until then a static figure is there.
+def addresses(scripts: Iterable[Path], folder: str) -> list[str]:
+    """Return where a page finds scripts: a digest of each joins its address, so that no browser keeps an old one.
 
     Args:
-        scripts: the files; a digest of each joins its address, so that no browser keeps an old one.
+        scripts: the files.
         folder: address of the folder in which the book has them, ending in a slash.
     """
-    addresses = [f"{folder}{script.name}?v={zlib.crc32(script.read_bytes()):08x}" for script in scripts]
-    return (
-        f"addEventListener('load', () => {{ for (const src of {json.dumps(addresses)}) "
-        "document.head.append(Object.assign(document.createElement('script'), { src, async: false })); });"
-    )
+    return [f"{folder}{script.name}?v={zlib.crc32(script.read_bytes()):08x}" for script in scripts]
 
 
 def let_pages_go_first(
@@ -213,6 +211,10 @@ def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 CHOOSE_THEME = """if (document.documentElement.dataset.theme === "auto")
   document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";"""
 
+# A page that is entered in its middle is laid out as a whole: a place found again must be the same place (see book.js).
+LAY_OUT_ALL = """if (location.hash || performance.getEntriesByType("navigation")[0]?.type !== "navigate")
+  document.documentElement.dataset.whole = "";"""
+
 
 def is_thebe(script: Any) -> bool:
     """Whether a script tag comes from sphinx-thebe: its file, or its inline settings."""
@@ -223,6 +225,7 @@ def is_thebe(script: Any) -> bool:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers (called by Sphinx)."""
     app.add_js_file(None, body=CHOOSE_THEME, priority=1)
+    app.add_js_file(None, body=LAY_OUT_ALL, priority=1)
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
     app.connect("html-page-context", let_pages_go_first, priority=950)

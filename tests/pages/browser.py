@@ -120,10 +120,15 @@ def choose_theme(theme: str) -> str:
     return f"localStorage.setItem('mode', '{theme}'); localStorage.setItem('theme', '{theme}');"
 
 
-# Resolves once the page has come to rest: fonts, MathJax, explorables.
-AT_REST = """async () => {
+# A page loads what is far from its first screen when the reader comes near it; told so, it loads all of it at once.
+EVERYTHING = "dispatchEvent(new Event('inbounds:everything'))"
+# Resolves once the page has come to rest: fonts, MathJax, explorables, also those that nobody has come near.
+AT_REST = (
+    f"async () => {{ {EVERYTHING};"
+    + """
   await document.fonts.ready;
   if (window.MathJax?.startup) await MathJax.startup.promise;
   const waiting = () => document.querySelector('.inbounds-explorable:is(:not([data-state]), [data-state=starting])');
   for (let i = 0; i < 100 && waiting(); i++) await new Promise((done) => setTimeout(done, 100));
 }"""
+)

@@ -171,6 +171,8 @@ def test_leaves_a_figure_where_it_cannot_run(
     if without == "BokehJS":
         page.route(re.compile(r"/bokeh[^/]*\.js"), lambda route: route.abort())
     page.goto(address + name, wait_until="networkidle")
+    if without == "BokehJS":
+        page.evaluate(book.AT_REST)
     for explorable in explorables(page):
         image = explorable.locator(".inbounds-static img")
         assert image.is_visible()

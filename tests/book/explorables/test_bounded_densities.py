@@ -215,6 +215,7 @@ def test_book_page_holds_no_script_but_data() -> None:
     html = bounded_densities().html(live=False)
     page = Page(html)
     assert 'class="inbounds-explorable"' in html  # by which the build finds the pages that need BokehJS
+    assert "--inbounds-plots: 320px; --inbounds-controls: 2" in html  # the room that the page keeps for it
     assert [script.get("type") for script in page.all("script")] == ["application/json"]
     assert len(html) < 120_000
     assert not re.findall(r"https?://", html)

@@ -10,6 +10,7 @@ const [executablePath, start, ...names] = process.argv.slice(2);
 const PATIENCE = 60_000;
 const WIDTHS = [1280, 360];
 const AT_REST = `async () => {
+  dispatchEvent(new Event("inbounds:everything"));
   await document.fonts.ready;
   const waiting = () => document.querySelector('.inbounds-explorable:is(:not([data-state]), [data-state=starting])');
   for (let i = 0; i < 300 && waiting(); i++) await new Promise((done) => setTimeout(done, 100));

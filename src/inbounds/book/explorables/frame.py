@@ -149,7 +149,7 @@ class Explorable:
         alt = html.escape(self.alt)
         return (
             f'<div class="inbounds-explorable" data-model="{self.name}" data-alt="{alt}" role="group" '
-            f'aria-label="{html.escape(self.title)}">'
+            f'aria-label="{html.escape(self.title)}" style="{self._room}">'
             f"<style>{_style_sheet(tuple(self.looks.items()))}</style>"
             f'<div class="inbounds-static"><img src="{self._static_image}" alt="{alt}"></div>'
             f'<div class="inbounds-live"><div class="inbounds-plot"></div>{self._table()}'
@@ -157,6 +157,12 @@ class Explorable:
             f'<script type="application/json">{self._item}</script>'
             f"{_scripts() if live else ''}</div>"
         )
+
+    @property
+    def _room(self) -> str:
+        """What a page needs to keep the explorable's place before it runs: height of plots, number of controls."""
+        heights = sum(plot.height or 0 for plot in self.plots)
+        return f"--inbounds-plots: {heights}px; --inbounds-controls: {len(self.controls)}"
 
     def _table(self) -> str:
         """Return the table of read-outs; its header is the legend of the plot."""
