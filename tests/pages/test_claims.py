@@ -82,6 +82,25 @@ def test_the_menu_chooses_by_subject(context: BrowserContext, address: str) -> N
     assert total == everything
 
 
+def test_a_choice_that_nothing_answers_to_has_a_way_out(context: BrowserContext, address: str) -> None:
+    _, claims = opened(context, address + NAME)
+    everything = shown(claims)
+    way_out = claims.get_by_role("button", name="Show all")
+    assert not way_out.is_visible()
+    menu = claims.locator("select")
+    for subject in menu.locator("option").all_inner_texts()[1:]:
+        menu.select_option(subject)
+        missing = next((word for word in MARKS if word not in shown(claims)), None)
+        if missing:
+            break
+    assert missing, "every subject has every verdict: nothing to try"
+    button(claims, missing).click()
+    assert shown(claims) == []
+    way_out.click()
+    assert shown(claims) == everything
+    assert not way_out.is_visible()
+
+
 def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) -> None:
     page, claims = opened(context, address + NAME)
     assert claims.get_by_role("status").get_attribute("aria-live") == "polite"

@@ -86,7 +86,7 @@ def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) 
 
 def test_what_is_missing_is_one_strip(context: BrowserContext, address: str) -> None:
     _, explorer = opened(context, address)
-    assert not explorer.locator(".explorer-missing").is_visible()  # as they come, PPO: nothing lacks
+    assert not explorer.locator(".explorer-missing").is_visible()  # usual starts, PPO: nothing lacks
     explorer.locator("input[value=printed]").check()
     strip = explorer.locator(".explorer-missing").inner_text()
     assert re.match(r"\d+ of \d+ differences are there\. Not finished: .*Ant", strip)
@@ -106,7 +106,7 @@ def test_chapter_16_moves_between_quiet_as_they_come_and_loud(context: BrowserCo
     seen = set()
     for start, words in (
         ("equal", "equally quiet"),
-        ("standard", "as they come"),
+        ("standard", "from the usual starts"),
         ("loud", "equally loud"),
     ):
         explorer.locator(f"input[value={start}]").check()

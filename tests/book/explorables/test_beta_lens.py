@@ -154,7 +154,9 @@ def test_the_note_says_where_more_of_a_parameter_leads(states: list[dict[str, An
         ((0.0, 0.0), "the uniform law, the widest of all", "none: flat"),
         ((1.0, 0.0), "no Beta policy is wider", "1.000"),
         ((0.0, 1.0), "no Beta policy is wider", "−1.000"),
-        ((END, 1.0), "α is at its cap", "0.957"),
+        ((END, 1.0), "α is at its cap, 80; less of it moves the mean down and makes the law wider", "0.957"),
+        ((0.0, END), "β is at its cap, 80; less of it moves the mean up and makes the law wider", "−1.000"),
+        ((0.0, END), "no other Beta policy has this mean", "−1.000"),
         ((1.0, END), "no Beta policy is narrower", "−0.957"),
     ],
 )
@@ -174,7 +176,7 @@ def test_table_html_and_fallback(states: list[dict[str, Any]]) -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
     for control in beta_lens().controls:  # as a page starts: the arrow to the left moves something
         assert control.start < control.value
     above, below = explorable.fallback().axes

@@ -115,7 +115,7 @@ def test_javascript_agrees(states: list[dict]) -> None:
         assert state["faults"]["best"] == pytest.approx(fork.best(), abs=1e-12)
         weights = state["sources"]["weights"]
         np.testing.assert_allclose(weights["top"], (0.9 * lam) ** np.array(weights["x"]), atol=1e-12)
-        first = ", ".join(f"{(0.9 * lam) ** step:.2f}" for step in range(2))
+        first = ", ".join(f"{(0.9 * lam) ** step:.3f}" for step in range(2))
         assert f"count with {first}" in state["note"]
         assert ("no λ has a bias" in state["note"]) == (missed == 0)
         assert ("nothing to the bias" in state["note"]) == (offset > 0)
@@ -135,8 +135,8 @@ def test_html_and_fallback() -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
-    assert all(f'\\"name\\": \\"{name}\\"' in sources for name in state["ranges"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{name}\\"' in sources for name in state["ranges"])
     for control in bias_and_variance().controls:  # as a page starts: the arrow to the left moves something
         assert control.start < control.value
     top, low = explorable.fallback().axes

@@ -154,7 +154,7 @@ def test_html_and_fallback() -> None:
     assert f"earns {yours:.1f}, the chapter's {chapter:.1f}." in explorable.alt
     document = json.dumps(explorable._item)
     names = [*state["sources"], *state["ranges"]]
-    assert all(f'\\"name\\": \\"{name}\\"' in document for name in names)
+    assert all(f'\\"name\\":\\"{name}\\"' in document for name in names)
     lines = {line.get_label(): line.get_data() for line in explorable.fallback().axes[0].lines}
     for name in explorable.columns:
         assert WHO[name].color in html

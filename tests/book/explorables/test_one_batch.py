@@ -23,6 +23,11 @@ POINTS = [
 KEYS = ("mu", "sigma", "promise", "truth", "effective", "kl")
 
 
+def short(nats: float) -> str:
+    """Two digits, or all before the point, as JavaScript's `toPrecision` writes them."""
+    return f"{nats:.0f}" if nats >= 10 else f"{nats:#.2g}"
+
+
 @pytest.fixture(scope="module")
 def states() -> list[dict[str, Any]]:
     return run_js(CALL, points=POINTS)  # type: ignore[no-any-return]
@@ -111,7 +116,9 @@ def test_table_note_and_ranges(states: list[dict[str, Any]]) -> None:
         seen.add("impossible" in state["note"])
         assert f"Of {draws} draws" in state["note"]
         best = int(np.argmax([at["truth"] for at in path]))
-        assert (f"largest after {best} steps" in state["note"]) == (best < 100)
+        assert (f"largest after {best} step" in state["note"]) == (0 < best < 100)
+        nats = f"{steps} of them are {short(path[steps]['kl'])} nats from the old policy"
+        assert (nats in state["note"]) == (steps > 1)
         low, high = state["ranges"]["gain"]
         assert low < min(*state["sources"]["truth"]["y"], 0) < most < high
         low, high = state["ranges"]["paid"]
@@ -139,7 +146,7 @@ def test_html_and_fallback() -> None:
     now = state["path"][50]
     assert f"promises {now['promise']:.2f}, the policy gains {now['truth']:.2f}" in explorable.alt
     document = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in document for source in state["sources"])
+    assert all(f'\\"name\\":\\"{source}\\"' in document for source in state["sources"])
     upper, lower = explorable.fallback().axes
     lines = {line.get_label(): np.array(line.get_ydata()) for line in upper.lines}
     for name in ("promise", "truth"):

@@ -83,7 +83,7 @@ def test_html_and_fallback() -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
     lines = {line.get_label(): line.get_data() for line in explorable.fallback().axes[0].lines}
     for name, look in CURVES.items():
         x, y = lines[look.label]

@@ -151,7 +151,7 @@ def test_table_html_and_fallback(states: list[dict[str, Any]]) -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
     for control in reinforce_step().controls:  # as a page starts: the arrow to the left moves something
         assert control.start + control.step < control.value
     top, middle, below = explorable.fallback().axes

@@ -107,7 +107,7 @@ def test_table_html_and_fallback() -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
     for control in score_estimators().controls:  # as a page starts: the arrow to the left moves something
         assert control.start < control.value
     fig = explorable.fallback()

@@ -147,7 +147,7 @@ def test_what_the_picture_shows(states: list[dict]) -> None:
             assert sources["recalled-top"]["y"][0] / height == pytest.approx(
                 action.ratio, rel=1e-6, abs=1e-12
             )
-            assert "spacing" in state["note"]
+            assert "representable number" in state["note"]
             assert state["table"]["latent"][1] == f"{action.recalled:.3f}"
         else:
             assert sources["recalled"] == {"x": [], "y": []}
@@ -169,8 +169,8 @@ def test_html_and_fallback() -> None:
     assert set(state["table"]) == set(explorable.rows)
     assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
     sources = json.dumps(explorable._item)
-    assert all(f'\\"name\\": \\"{source}\\"' in sources for source in state["sources"])
-    assert all(f'\\"name\\": \\"{name}\\"' in sources for name in state["ranges"])
+    assert all(f'\\"name\\":\\"{source}\\"' in sources for source in state["sources"])
+    assert all(f'\\"name\\":\\"{name}\\"' in sources for name in state["ranges"])
     for control in explorable.controls:  # as a page starts: the arrow to the left moves something
         assert control.start < control.value
     (ax,) = explorable.fallback().axes

@@ -261,7 +261,7 @@ def test_a_page_may_choose_what_is_shown_at_first(outcomes: Outcomes) -> None:
     assert [value for name, value in ticked if name == "robot"] == ["HalfCheetah", "Ant"]
     assert ("algorithm", "trpo") in ticked
     assert ("start", "standard") in ticked
-    assert "Learning curves, TRPO, as they come" in html
+    assert "Learning curves, TRPO, from the usual starts" in html
     assert "Hopper: Gaussian" not in html
     with pytest.raises(TypeError, match="no such choice: robot;"):
         element.study_explorer(outcomes, robot="Ant")

@@ -12,7 +12,7 @@ from tests.study.synthetic import write_cells
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
-    """Ant under TRPO, Gaussian and logit-normal, as they come, quiet and loud; on Hopper only as they come."""
+    """Ant under TRPO, Gaussian and logit-normal, usual starts, quiet and loud; on Hopper only usual starts."""
     folder = folder_in(tmp_path_factory.mktemp("leads"))
     names = [
         f"standard-{robot}-trpo-{law}" for robot in ("ant", "hopper") for law in ("gaussian", "logit-normal")
@@ -24,11 +24,11 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
 
 def test_each_start_that_was_run(outcomes: Outcomes) -> None:
     found = {(lead.robot, lead.endpoint, lead.start) for lead in leads_of(outcomes)}
-    starts = ("as they come", "both quiet", "both loud")
+    starts = ("usual starts", "both quiet", "both loud")
     assert {each for each in found if each[0] == "Ant"} == {
         ("Ant", endpoint, start) for endpoint in ("final", "area") for start in starts
     }
-    assert {start for robot, _, start in found if robot == "Hopper"} == {"as they come"}
+    assert {start for robot, _, start in found if robot == "Hopper"} == {"usual starts"}
 
 
 def test_a_difference_that_is_not_found_is_no_lead(outcomes: Outcomes, tmp_path) -> None:

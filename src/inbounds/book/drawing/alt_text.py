@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import base64
 import io
+import re
+import urllib.parse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -34,6 +36,31 @@ def svg_bytes(fig: Figure) -> bytes:
     with mpl.rc_context({"svg.hashsalt": "inbounds", "svg.fonttype": "path"}):
         fig.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
+
+
+def svg_uri(fig: Figure) -> str:
+    """Return a figure as the address of an SVG: with places to a hundredth of a point, which no eye can tell apart.
+
+    Written out, not in base64: that is a quarter less, and a server's compression makes less than half of it.
+    """
+    svg = svg_bytes(fig).decode("utf-8")
+    svg = re.sub(r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    places = re.compile(r'\b(?:d|x|y)="[^"]*"|translate\([^)]*\)')
+    svg = places.sub(lambda where: re.sub(r"-?\d+\.\d{3,}", _in_hundredths, where[0]), svg)
+    svg = re.sub(r"\s+", " ", svg)
+    svg = re.sub(r'\bd="[^"]*"', lambda path: re.sub(r" ?([A-Zz]) ?", r"\1", path[0]), svg).replace('"', "'")
+    address = urllib.parse.quote(svg.strip(), safe=_SAFE).replace(
+        "://", ":%2F%2F"
+    )  # no page seems to ask elsewhere
+    return f"data:image/svg+xml,{address}"
+
+
+_SAFE = " '()*+,-./:;=?@_"
+"""What an address may have as it is, inside double quotes."""
+
+
+def _in_hundredths(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def _with_few_colors(png: bytes, colors: int) -> bytes:

@@ -29,7 +29,7 @@ from cycler import cycler
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from inbounds.book.drawing.alt_text import PIXELS_PER_INCH, png_bytes, show, svg_bytes
+from inbounds.book.drawing.alt_text import PIXELS_PER_INCH, png_bytes, show, svg_bytes, svg_uri
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -51,6 +51,7 @@ __all__ = [
     "saturation_histogram",
     "show",
     "svg_bytes",
+    "svg_uri",
     "use_style",
 ]
 

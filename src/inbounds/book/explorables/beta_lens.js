@@ -104,13 +104,17 @@ inbounds.models["beta-lens"] = ({ log_alpha, log_beta }) => {
 
   // d log variance / d log alpha, up to a positive factor; the other by symmetry.
   const widens = (own) => 1 / own - 2 / (alpha + beta) - 1 / (alpha + beta + 1) > 0;
-  const moves = (name, own, way) =>
-    own > CAP - 1e-6
-      ? `${name} is at its cap`
-      : `more ${name} moves the mean ${way} and makes the law ${widens(own) ? "wider" : "narrower"}`;
+  const moves = (name, own, ways) => {
+    const [up, back] = widens(own) ? ["wider", "narrower"] : ["narrower", "wider"];
+    return own > CAP - 1e-6
+      ? `${name} is at its cap, ${CAP}; less of it moves the mean ${ways[1]} and makes the law ${back}. `
+      : `More ${name} moves the mean ${ways[0]} and makes the law ${up}. `;
+  };
   const edge =
     most < 1 + 1e-9
       ? "This is the uniform law, the widest of all Beta policies. "
+      : least < 1 + 1e-9 && most > CAP - 1e-6
+        ? `One parameter is 1, the other ${CAP}: no other Beta policy has this mean. `
       : least < 1 + 1e-9
         ? "One parameter is 1: at this mean no Beta policy is wider. "
         : most > CAP - 1e-6
@@ -144,7 +148,7 @@ inbounds.models["beta-lens"] = ({ log_alpha, log_beta }) => {
       narrowest: [number(narrowest), "below 0.001"],
     },
     note:
-      `${moves("α", alpha, "up").replace(/^m/, "M")}; ${moves("β", beta, "down")}: neither moves along the upright line. ` +
+      moves("α", alpha, ["up", "down"]) + moves("β", beta, ["down", "up"]) + "Neither moves along the upright line. " +
       edge +
       `With the mean at ${number(mean, 2)}, a Beta policy has a standard deviation from ${number(narrowest)} to ` +
       `${number(widest)}, a logit-normal policy one of up to ${number(roof)}.`,

@@ -26,6 +26,7 @@ from scipy import optimize
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, family_curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.learning import Limits
 
@@ -34,6 +35,31 @@ __all__ = ["BetaInItsLens", "beta_lens"]
 _CAP = Limits().concentration_max
 _WIDEST = float(np.exp(Limits().log_std_max))
 _ACTIONS = (-1.35, 1.35)
+
+LEGEND = (
+    Mark(
+        "upright",
+        "ink",
+        "above, the mean; below, the spreads that a Beta can have at this mean",
+        of=("at-mean", "reach"),
+    ),
+    Mark("ring", "ink", "this Beta", of=("here",)),
+    Mark("area", "beta", f"all Betas with α and β from 1 to {_CAP:g}", of=("lens",)),
+    Mark("thin", "logit-normal", "the widest logit-normals, σ = e = 2.72", of=("arch",)),
+    Mark(
+        "dotted",
+        "beta",
+        f"one parameter alone: from 1 to {_CAP:g}, its end at α↑ or β↑",
+        of=("path-alpha", "path-beta", "ends"),
+    ),
+    Mark(
+        "line",
+        "logit-normal",
+        "below, the logit-normal’s σ alone: from 0.02 to e, its end at σ↑",
+        of=("path-sigma", "ends"),
+    ),
+)
+"""What the marks of both plots mean."""
 
 
 @dataclass(frozen=True)
@@ -147,16 +173,17 @@ def beta_lens(alpha: float = 6.0, beta: float = 2.0) -> Explorable:
             slider("log_beta", "β (logarithmic)", 0.0, float(np.log(_CAP)), float(np.log(beta)), 0.05, log=True),
         ),
         plots=(_densities(), _plane()),
-        columns={"beta": "Beta", "logit-normal": "Logit-normal"},
+        columns={"beta": "Beta", "logit-normal": "Logit-normal, same mean and spread"},
         rows={
             "parameters": "parameters",
             "mean": "mean",
             "std": "standard deviation",
             "mode": "mode(s)",
-            "widest": "largest at this mean",
-            "narrowest": "smallest at this mean",
+            "widest": "largest std. at this mean",
+            "narrowest": "smallest std. at this mean",
         },
         fallback=lambda: _static(policy),
+        legend=LEGEND,
     )  # fmt: skip
 
 

@@ -33,16 +33,17 @@ inbounds.models["bias-and-variance"] = ({ lam, missed, offset, visits }) => {
   const number = (v, digits = 3) => v.toFixed(digits);
   const cells = (at) => names.map((name) => number(faults(at)[name]));
   const percent = (v) => `${number(100 * v, 0)}\u202f%`;
-  const first = weights.slice(0, 4).map((w) => number(w, 2)).join(", ");
+  const first = weights.slice(0, 4).map((w) => number(w)).join(", ");
+  const missing = here.bias === 0 ? "nothing" : percent(Math.sqrt(here.bias));
   const judgement =
     missed === 0
       ? "The critic is right about both roads: no λ has a bias, and λ = 0 has the least variance. "
-      : `On average the estimate misses ${percent(Math.sqrt(here.bias))} of the gradient, and the sum is smallest at ` +
-        `λ = ${number(best, 2)}. `;
+      : `The critic misses ${percent(missed)} of a road's value; on average the estimate misses ${missing} of the gradient. ` +
+        `The sum is smallest at λ = ${Number(number(best))}. `;
   const baseline =
     offset === 0
       ? ""
-      : `The error at the fork adds ${number(offset ** 2 / visits)} to the variance, at every λ, and nothing to the bias.`;
+      : `The error at the fork, ${percent(offset)} of the advantage, adds ${number(offset ** 2 / visits)} to the variance, at every λ, and nothing to the bias.`;
   return {
     sources,
     ranges: { y: [-0.02 * top, top], weight: [0, 1.05] },

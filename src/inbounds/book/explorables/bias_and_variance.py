@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 
 __all__ = ["FAULTS", "Fork", "bias_and_variance"]
 
@@ -32,6 +33,15 @@ FAULTS: dict[str, figures.FamilyStyle] = {
     "sum": figures.FamilyStyle("sum", "#4B1E78", "#A98BF0", "-", "o"),
 }
 """The two faults of an estimate and their sum, the mean squared error, and the look of each."""
+
+LEGEND = (
+    Mark(
+        "ring", "ink", "at this λ, where the upright line is", of=(*(f"{name}-here" for name in FAULTS), "at")
+    ),
+    Mark("diamond", "ink", "the smallest sum", of=("best",)),
+    Mark("bars", "line", "weights of the residuals at this λ", of=("weights",)),
+)
+"""What the marks mean that the table does not name."""
 
 _LAMBDA, _MISSED, _OFFSET, _VISITS = (0.0, 1.0), (0.0, 1.0), (0.0, 1.0), (1, 20)
 _STEPS = 25
@@ -126,7 +136,7 @@ def bias_and_variance(
         )
     fork = Fork(missed, offset, visits)
     here = {name: float(value) for name, value in fork.faults(lam).items()}
-    count = slider("visits", "visits averaged", *_VISITS, visits, 1)
+    count = slider("visits", "visits to the fork, averaged", *_VISITS, visits, 1)
     count.format = "0"
     return Explorable(
         name="bias-and-variance",
@@ -138,9 +148,9 @@ def bias_and_variance(
             f"{here['bias']:.3f} and the variance {here['variance']:.3f}; the sum is smallest at λ = {fork.best():.2f}."
         ),
         controls=(
-            slider("lam", "λ", *_LAMBDA, lam, 0.05),
-            slider("missed", "critic's error on the roads", *_MISSED, missed, 0.1),
-            slider("offset", "critic's error at the fork", *_OFFSET, offset, 0.1),
+            slider("lam", "λ of the estimate", *_LAMBDA, lam, 0.05),
+            slider("missed", "critic's error on the roads [share]", *_MISSED, missed, 0.1),
+            slider("offset", "critic's error at the fork [share]", *_OFFSET, offset, 0.1),
             count,
         ),
         plots=(_curves(), _weights()),
@@ -153,6 +163,7 @@ def bias_and_variance(
         },
         fallback=lambda: _static(fork, lam),
         looks=FAULTS,
+        legend=LEGEND,
     )
 
 

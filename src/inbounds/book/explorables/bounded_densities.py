@@ -8,17 +8,13 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
-from bokeh.models import ColumnDataSource, LinearAxis, Range1d, Span
+from bokeh.models import ColumnDataSource, LinearAxis, Range1d
 from matplotlib.figure import Figure
 from scipy import stats
 
 from inbounds.book.drawing import figures
-from inbounds.book.explorables.frame import (
-    Explorable,
-    family_curve,
-    plot,
-    slider,
-)
+from inbounds.book.explorables.frame import BOUNDS, Explorable, bounds, family_curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.distributions import LogitNormal
 
 __all__ = ["MatchedLaws", "bounded_densities"]
@@ -137,12 +133,21 @@ def bounded_densities(mu: float = 1.0, sigma: float = 1.0) -> Explorable:
             "modes": "mode(s) inside",
         },
         fallback=lambda: _bounded_densities_figure(laws),
+        legend=(
+            BOUNDS,
+            Mark(
+                "hatched",
+                "gaussian",
+                "share of the Gaussian’s actions at a bound: axis at the right",
+                of=("atoms",),
+            ),
+        ),
     )
 
 
 def _add_atoms(fig: Any) -> None:
     """Draw bars beside the two bounds for the Gaussian's mass there, on an axis of probability at the right."""
-    fig.renderers.extend(Span(location=bound, dimension="height", line_width=1) for bound in (-1.0, 1.0))
+    bounds(fig)
     fig.extra_y_ranges = {"mass": Range1d(0.0, 1.0)}
     fig.add_layout(
         LinearAxis(
@@ -175,6 +180,7 @@ def _bounded_densities_figure(laws: MatchedLaws) -> Figure:
         fig, ax = plt.subplots(figsize=(figures.WIDTH, 4.2))
         for family, values in density.items():
             ax.plot(inside, values, **figures.family_style(family))
+        ax.vlines((-1.0, 1.0), 0.0, 1.0, transform=ax.get_xaxis_transform(), color="#5F6770", linewidth=1)
         ax.set(
             xlim=(-1.35, 1.35), ylim=(0.0, None), xlabel="executed action (±1: full torque)", ylabel="density"
         )

@@ -15,7 +15,6 @@ Where BokehJS comes from:
 
 from __future__ import annotations
 
-import base64
 import functools
 import html
 import json
@@ -29,12 +28,22 @@ import bokeh
 import matplotlib.pyplot as plt
 from bokeh.embed import json_item
 from bokeh.layouts import column, row
-from bokeh.models import ColumnDataSource, CustomJS, CustomJSTickFormatter, InlineStyleSheet, Range1d, Slider
+from bokeh.models import (
+    ColumnDataSource,
+    CustomJS,
+    CustomJSTickFormatter,
+    GlyphRenderer,
+    InlineStyleSheet,
+    Range1d,
+    Slider,
+    Span,
+)
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
 from inbounds.book.drawing import figures
 from inbounds.book.drawing.variables import color_variables
+from inbounds.book.explorables.legend import Mark
 
 _HERE = Path(__file__).parent
 
@@ -102,6 +111,8 @@ class Explorable:
     """Draws the static figure at the initial values."""
     looks: Mapping[str, figures.FamilyStyle] = field(default_factory=lambda: figures.LOOKS)
     """The look of every curve: the policy families', where the curves are families."""
+    legend: tuple[Mark, ...] = ()
+    """What the marks mean that no head of the table names, in the order of the plots."""
 
     def __post_init__(self) -> None:
         """Check the name, and make every control recompute the page."""
@@ -109,8 +120,14 @@ class Explorable:
             raise ValueError(
                 f"no JavaScript model for {self.name!r}: add {self.name.replace('-', '_')}.js to {_HERE}"
             )
+        for mark in self.legend:
+            if mark.color not in self.looks and mark.color not in _COLORS["light"]:
+                raise ValueError(
+                    f"no colour {mark.color!r} for the mark of {mark.text!r}: add it to the looks"
+                )
+        refresh = CustomJS(code="inbounds.refresh(cb_obj.document)")
         for control in self.controls:
-            control.js_on_change("value", CustomJS(code="inbounds.refresh(cb_obj.document)"))
+            control.js_on_change("value", refresh)
 
     def __repr__(self) -> str:
         """Return a line that never changes: what a notebook without a browser keeps of it."""
@@ -125,20 +142,25 @@ class Explorable:
     def _static_image(self) -> str:
         """The static figure as a data URI."""
         fig = self.fallback()
-        svg = figures.svg_bytes(fig)
+        address = figures.svg_uri(fig)
         plt.close(fig)
-        return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
+        return address
 
     @functools.cached_property
     def _item(self) -> str:
-        """The Bokeh document as JSON, with ids that do not depend on what was drawn before."""
+        """The Bokeh document as JSON, with ids that do not depend on what was drawn before, and nothing twice."""
+        for control in self.controls:
+            control.stylesheets = self.controls[0].stylesheets
+        for renderer in (
+            each for fig in self.plots for each in fig.renderers if isinstance(each, GlyphRenderer)
+        ):
+            renderer.update(muted_glyph=None, nonselection_glyph=None)  # nothing is muted or selected here
         controls = row(
             *self.controls, sizing_mode="stretch_width", styles={"flex-wrap": "wrap", "gap": "0 1rem"}
         )
         layout = column(controls, *self.plots, sizing_mode="stretch_width")
-        return json.dumps(_with_fixed_ids(json_item(layout), self.name), ensure_ascii=False).replace(
-            "</", "<\\/"
-        )
+        item = _with_fixed_ids(json_item(layout), self.name)
+        return json.dumps(item, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
 
     def html(self, *, live: bool) -> str:
         """Return the explorable as HTML.
@@ -151,8 +173,8 @@ class Explorable:
             f'<div class="inbounds-explorable" data-model="{self.name}" data-alt="{alt}" role="group" '
             f'aria-label="{html.escape(self.title)}" style="{self._room}">'
             f"<style>{_style_sheet(tuple(self.looks.items()))}</style>"
-            f'<div class="inbounds-static"><img src="{self._static_image}" alt="{alt}"></div>'
-            f'<div class="inbounds-live"><div class="inbounds-plot"></div>{self._table()}'
+            f'<div class="inbounds-static"><img src="{self._static_image}" alt="{alt}">{self._legend()}</div>'
+            f'<div class="inbounds-live"><div class="inbounds-plot"></div>{self._legend()}{self._table()}'
             f'<p class="inbounds-note" aria-live="polite"></p></div>'
             f'<script type="application/json">{self._item}</script>'
             f"{_scripts() if live else ''}</div>"
@@ -163,6 +185,11 @@ class Explorable:
         """What a page needs to keep the explorable's place before it runs: height of plots, number of controls."""
         heights = sum(plot.height or 0 for plot in self.plots)
         return f"--inbounds-plots: {heights}px; --inbounds-controls: {len(self.controls)}"
+
+    def _legend(self) -> str:
+        """Return the marks and what they mean, a list; nothing where the table's heads say it all."""
+        items = "".join(f"<li>{mark.swatch()}<span>{mark.text}</span></li>" for mark in self.legend)
+        return f'<ul class="inbounds-legend">{items}</ul>' if items else ""
 
     def _table(self) -> str:
         """Return the table of read-outs; its header is the legend of the plot."""
@@ -209,8 +236,11 @@ def _with_fixed_ids(item: Any, name: str) -> Any:
 @functools.cache
 def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
     """Return the style of an explorable, with the colours of its curves for both themes."""
-    dark = '{}[data-theme="dark"]'
-    variables = color_variables(".inbounds-explorable", "inbounds", _COLORS, dict(looks), dark)
+    itself, dark = (
+        ":is(.inbounds-explorable, .inbounds-static)",
+        '{}[data-theme="dark"]',
+    )  # a still picture stays light
+    variables = color_variables(itself, "inbounds", _COLORS, dict(looks), dark)
     return "\n".join([variables, (_HERE / "explorables.css").read_text(encoding="utf-8")])
 
 
@@ -284,6 +314,16 @@ def plot(
     fig.axis.axis_label_text_font_size = "14px"
     fig.axis.major_label_text_font_size = "13px"
     return fig
+
+
+def bounds(fig: figure) -> None:
+    """Draw a thin upright line at each bound of the box [-1, 1]; `BOUNDS` is its mark."""
+    fig.renderers.extend(
+        Span(location=bound, dimension="height", line_width=1, name="bounds") for bound in (-1.0, 1.0)
+    )
+
+
+BOUNDS = Mark("upright", "line", "bounds of the box", of=("bounds",))
 
 
 def family_curve(fig: figure, family: str) -> None:

@@ -60,6 +60,21 @@ inbounds.models["greedy-action"] = ({ mu, log_sigma }) => {
   const opposite = law.cdf(0);
   const wrongSide = mu < 0 ? 1 - opposite : opposite;
 
+  const centred = Math.abs(mu) < 1e-9;
+  const drawn = centred
+    ? "The policy draws an action on either side of zero with equal probability. "
+    : `The policy draws an action on the other side of zero ${wrongSide < 0.005 ? "less than 1" : number(100 * wrongSide, 0)} % of the time. `;
+  const peaks = sigma * sigma <= 2
+    ? "It has one peak; σ² is at most 2, and all three actions move smoothly with μ. "
+    : centred
+      ? "It has two peaks of one height, of which the right one is shown; σ² exceeds 2, and here the mode jumps from one to the other. "
+      : law.modes.length === 2
+        ? "It has two peaks; the mode is the higher one, and jumps to the other side when μ changes its sign. "
+        : "It has one peak here, but σ² exceeds 2: at μ = 0 the mode jumps. ";
+  const closest = centred
+    ? "At μ = 0 mean and median coincide."
+    : "Of the three, the mean has the smallest root mean square error, the median the smallest absolute error.";
+
   return {
     sources,
     ranges: { density: [0, top], over_mu: [-1.05, 1.05], over_sigma: [-1.05, 1.05] },
@@ -69,14 +84,7 @@ inbounds.models["greedy-action"] = ({ mu, log_sigma }) => {
       rms: cells((name) => errors[name].rms),
       slope: cells((name) => slopes[name]),
     },
-    note:
-      `The policy draws an action on the other side of zero ${number(100 * wrongSide, 0)} % of the time. ` +
-      (law.modes.length === 2
-        ? "It has two peaks; the mode is the higher one, and jumps to the other side when μ changes its sign."
-        : sigma * sigma > 2
-          ? "It has one peak here, but σ² exceeds 2: at μ = 0 the mode jumps."
-          : "It has one peak; σ² is at most 2, and all three actions move smoothly with μ.") +
-      " Of the three, the mean has the smallest root mean square error, the median the smallest absolute error.",
+    note: drawn + peaks + closest,
     centres: here, // for the tests
     slopes,
     errors,

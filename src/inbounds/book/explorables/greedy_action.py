@@ -18,12 +18,13 @@ from types import MappingProxyType
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
-from bokeh.models import ColumnDataSource, Span
+from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
 from inbounds.book.drawing import figures
-from inbounds.book.explorables.frame import Explorable, curve, family_curve, plot, slider
+from inbounds.book.explorables.frame import BOUNDS, Explorable, bounds, curve, family_curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.distributions import LogitNormal
 
 __all__ = ["CENTRES", "GreedyActions", "greedy_actions"]
@@ -120,7 +121,7 @@ def greedy_actions(mu: float = 0.3, sigma: float = 1.6) -> Explorable:
         curve(over_sigma, name, look, source=f"sigma_{name}")
     _add_cursor(over_mu, "cursor_mu")
     _add_cursor(over_sigma, "cursor_sigma")
-    density.renderers.extend(Span(location=bound, dimension="height", line_width=1) for bound in (-1.0, 1.0))
+    bounds(density)
     return Explorable(
         name="greedy-action",
         title="three greedy actions of a logit-normal policy, over location μ and scale σ",
@@ -143,6 +144,11 @@ def greedy_actions(mu: float = 0.3, sigma: float = 1.6) -> Explorable:
         },
         fallback=lambda: _static_figure(policy),
         looks={**CENTRES, "logit-normal": figures.LOOKS["logit-normal"]},
+        legend=(
+            Mark("line", "logit-normal", "density of the action", of=("density",)),
+            BOUNDS,
+            Mark("upright dotted", "line", "your μ and your σ", of=("cursor_mu", "cursor_sigma")),
+        ),
     )
 
 
@@ -170,6 +176,10 @@ def _static_figure(policy: GreedyActions) -> Figure:
             axes[0].axvline(policy.actions[name], label=centre.label, **style)
             axes[1].plot(mu, over_mu[name], **style)
             axes[2].plot(sigma, over_sigma[name], **style)
+        for bound in (-1.0, 1.0):
+            axes[0].axvline(bound, color="#5F6770", linewidth=1, linestyle="-")
+        for ax, at in zip(axes[1:], (policy.mu, policy.sigma), strict=True):
+            ax.axvline(at, color="#5F6770", linewidth=1, linestyle=":")
         axes[0].set(xlabel="action", title="density", ylim=(0, None))
         axes[1].set(xlabel="μ", title=f"σ = {policy.sigma:.3g}", ylim=(-1.05, 1.05))
         axes[2].set(xlabel="σ", title=f"μ = {policy.mu:.3g}", ylim=(-1.05, 1.05), xscale="log")

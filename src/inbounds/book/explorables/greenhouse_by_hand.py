@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.book.own_task import greedy
 from inbounds.book.own_task import greenhouse as house
 from inbounds.book.own_task import greenhouse_runs as runs
@@ -153,7 +154,7 @@ def greenhouse_by_hand(
             _days(day),
             slider("night", "aim at night [°C]", *_AIM, night_aim, 0.5, digits=1),
             slider("day", "aim by day [°C]", *_AIM, day_aim, 0.5, digits=1),
-            slider("gain", "kW per degree", *_GAIN, gain, 0.5, digits=1),
+            slider("gain", "power per °C below the aim [kW]", *_GAIN, gain, 0.5, digits=1),
             slider("opens", "vent opens from [°C]", *_OPENS, opens, 0.5, digits=1),
         ),
         plots=_course(),
@@ -171,6 +172,11 @@ def greenhouse_by_hand(
         },
         fallback=lambda: _static(rule, day),
         looks=WHO,
+        legend=(
+            Mark("band", "grid", "17 to 25 °C, where the crop grows well", of=("band",)),
+            Mark("thin", "line", "first plot: the temperature outside", of=("outside",)),
+            Mark("thin", "line", "second plot: the pump’s bounds, −2 and 8 kW", of=("bounds",)),
+        ),
     )
 
 

@@ -18,12 +18,13 @@ from typing import Any, TypeAlias
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
-from bokeh.models import ColumnDataSource, Span
+from bokeh.models import ColumnDataSource
 from matplotlib.figure import Figure
 from torch.distributions import Distribution, kl_divergence
 
 from inbounds.book.drawing import figures
-from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.frame import BOUNDS, Explorable, bounds, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.distributions import ClippedNormal
 from inbounds.learning.families import FAMILIES, NormalParameters
 
@@ -141,15 +142,26 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
         plots=tuple(_picture(family) for family in MAPS),
         columns={family: shown.does for family, shown in MAPS.items()},
         rows={
-            "kl": "KL(old‖new)",
-            "reverse": "KL(new‖old)",
+            "kl": "KL(old‖new) [nats]",
+            "reverse": "KL(new‖old) [nats]",
             "variation": "total variation",
-            "entropy_old": "entropy, old",
-            "entropy_new": "entropy, new",
+            "entropy_old": "entropy, old [nats]",
+            "entropy_new": "entropy, new [nats]",
             "mean_old": "mean, old",
             "mean_new": "mean, new",
         },
         fallback=lambda: _static_figure(policies),
+        legend=(
+            Mark("wide", "ink", "old policy: wide and pale", of=tuple(f"{family}-old" for family in MAPS)),
+            Mark("line", "ink", "new policy: narrow", of=tuple(f"{family}-new" for family in MAPS)),
+            BOUNDS,
+            Mark(
+                "bars",
+                "clipped-gaussian",
+                "probability of the bound that they stand beside",
+                of=("atoms-old", "atoms-new"),
+            ),
+        ),
     )
 
 
@@ -173,7 +185,7 @@ def _picture(family: str) -> Any:
                 line_width=2,
             )  # fmt: skip
     if shown.bounded:
-        fig.renderers.extend(Span(location=bound, dimension="height", line_width=1) for bound in (-1.0, 1.0))
+        bounds(fig)
     return fig
 
 
@@ -192,6 +204,8 @@ def _static_figure(policies: TwoPolicies) -> Figure:
                     place = 1.1 if width > 3 else 1.22
                     masses = [float(law.mass_low), float(law.mass_high)]
                     ax.bar([-place, place], masses, width=0.1, color=style["color"], alpha=0.6 * alpha)
+            for bound in (-1.0, 1.0) if shown.bounded else ():
+                ax.axvline(bound, color="#5F6770", linewidth=1, linestyle="-")
             ax.set(
                 title=f"{shown.does}: {policies.kl(family)[0]:.3f} nats", xlabel="action", ylim=(0.0, None)
             )

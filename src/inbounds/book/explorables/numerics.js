@@ -1,7 +1,7 @@
 // The mathematics behind the explorables: densities, masses and moments on the box [-1, 1].
 //
 // Every law is an object with the same fields, so that an explorable can treat them alike:
-//   density(a)  per unit of action, inside the box     cdf(a)   P(action <= a), without an atom at the upper bound
+//   density(a), logDensity(a)  per unit of action, inside the box     cdf(a)   P(action <= a), without an atom at the upper bound
 //   atLow, atHigh  probability of the bounds themselves
 //   mean, std, median, modes (ascending)
 // tests/book/explorables/test_bounded_densities.py compares all of it with the Python package and SciPy.
@@ -14,6 +14,7 @@ inbounds.numerics = (() => {
   const LOG_SQRT_2PI = 0.5 * Math.log(2 * Math.PI);
 
   const normalPdf = (x) => Math.exp(-0.5 * x * x - LOG_SQRT_2PI);
+  const logNormalPdf = (x, mu, sigma) => -0.5 * ((x - mu) / sigma) ** 2 - LOG_SQRT_2PI - Math.log(sigma);
 
   // Series of Marsaglia (2004), Evaluating the Normal Distribution, Journal of Statistical Software 11(4).
   function normalCdf(x) {
@@ -26,6 +27,14 @@ inbounds.numerics = (() => {
       sum += term;
     }
     return 0.5 + sum * normalPdf(x);
+  }
+
+  // log P(z <= x), where P itself would be lost in rounding: Laplace's continued fraction for the tail (DLMF 7.9.1).
+  function logNormalCdf(x) {
+    if (x > -4) return Math.log(normalCdf(x));
+    let below = -x;
+    for (let k = 80; k > 0; k--) below = -x + k / below;
+    return -0.5 * x * x - LOG_SQRT_2PI - Math.log(below);
   }
 
   // Stirling's series, after the recurrence has lifted the argument to where the series is exact in doubles.
@@ -91,8 +100,10 @@ inbounds.numerics = (() => {
     const mean = expectation(squash, mu, sigma);
     const variance = expectation((z) => (squash(z) - mean) ** 2, mu, sigma);
     const atLatent = (z) => (normalPdf((z - mu) / sigma) / sigma) * 2 * Math.cosh(0.5 * z) ** 2;
+    const logAtLatent = (z) => logNormalPdf(z, mu, sigma) + Math.LN2 + 2 * Math.log(Math.cosh(0.5 * z));
     return {
       density: (a) => (Math.abs(a) < 1 ? atLatent(2 * Math.atanh(a)) : 0),
+      logDensity: (a) => logAtLatent(2 * Math.atanh(a)),
       cdf: (a) => (a >= 1 ? 1 : a <= -1 ? 0 : normalCdf((2 * Math.atanh(a) - mu) / sigma)),
       atLow: 0,
       atHigh: 0,
@@ -128,9 +139,12 @@ inbounds.numerics = (() => {
     const clipped = Math.min(1, Math.max(-1, m));
     return {
       density: (x) => (Math.abs(x) <= 1 ? normalPdf((x - m) / s) / s : 0),
+      logDensity: (x) => logNormalPdf(x, m, s),
       cdf: (x) => (x >= 1 ? 1 : x < -1 ? 0 : normalCdf((x - m) / s)),
       atLow,
       atHigh,
+      logAtLow: logNormalCdf(a),
+      logAtHigh: logNormalCdf(-b),
       mean,
       std: Math.sqrt(Math.max(0, square - mean * mean)),
       median: clipped,
@@ -164,7 +178,7 @@ inbounds.numerics = (() => {
   }
 
   return {
-    normalPdf, normalCdf, logGamma, betaCdf, bisect, expectation,
+    normalPdf, normalCdf, logNormalPdf, logNormalCdf, logGamma, betaCdf, bisect, expectation,
     logitNormal, logitNormalLatentModes, clippedGaussian, matchedBeta,
   };
 })();

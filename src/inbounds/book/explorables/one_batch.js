@@ -98,6 +98,7 @@ inbounds.models["one-batch"] = ({ steps, draws, noise, batch }) => {
 
   const number = (v, digits = 2) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
   const cells = (key, digits) => [now, early].map((at) => number(at[key], digits));
+  const short = (v) => (v < 10 ? v.toPrecision(2) : number(v, 0));
   const impossible = now.promise > most;
   const top = path.reduce((best, at, i) => (at.truth > path[best].truth ? i : best), 0);
   return {
@@ -127,6 +128,10 @@ inbounds.models["one-batch"] = ({ steps, draws, noise, batch }) => {
       at: [`${steps}`, `${brake}`],
     },
     note:
+      (steps > 1
+        ? `Each step is 0.001 nats from the step before it; ${steps} of them are ${short(now.kl)} nats from the old policy, ` +
+          "for a divergence grows like the square of the way. "
+        : "") +
       `No policy can gain more than ${number(most)}, the thin line. ` +
       (impossible
         ? `The surrogate promises ${number(now.promise)}, which is impossible, and `
@@ -134,8 +139,10 @@ inbounds.models["one-batch"] = ({ steps, draws, noise, batch }) => {
       `the policy gains ${number(now.truth)}. ` +
       `Of ${draws} draws ${number(now.effective, 1)} still count. ` +
       (top === path.length - 1
-        ? "With this batch the true gain rises to the last step."
-        : `The true gain is largest after ${top} steps; nothing in the batch shows where.`),
+        ? "With this batch the true gain is largest at the last step."
+        : top === 0
+          ? "With this batch no step gains anything."
+          : `The true gain is largest after ${top} step${top === 1 ? "" : "s"}; nothing in the batch shows where.`),
     path: path.map(({ weights, ...at }) => at), // for the tests
     batch: drawn,
     top,

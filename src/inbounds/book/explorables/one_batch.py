@@ -28,6 +28,7 @@ from torch import Tensor
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.book.explorables.trust_region import OneMotor
 from inbounds.learning.families import FAMILIES, NormalParameters
 from inbounds.learning.ppo import clipped_surrogate
@@ -38,9 +39,23 @@ CURVES: dict[str, figures.FamilyStyle] = {
     "promise": figures.FamilyStyle("surrogate, promised gain", "#A8330A", "#DD5B33", "-", "s"),
     "truth": figures.FamilyStyle("true gain", "#4B1E78", "#A98BF0", "--", "o"),
     "now": figures.FamilyStyle("at your step", "#CC7E14", "#FFD394", "-.", "D"),
-    "brake": figures.FamilyStyle("stopped at 0.03 nats", "#1F8277", "#52CCAB", ":", "^"),
+    "brake": figures.FamilyStyle("first step past 0.03 nats", "#1F8277", "#52CCAB", ":", "^"),
 }
 """What is promised and what is earned, the reader's step and that of early stopping, and the look of each."""
+
+LEGEND = (
+    Mark("thin", "line", "above, the most that any policy can gain", of=("most",)),
+    Mark(
+        "ring",
+        "promise",
+        "a draw at its estimated advantage; its area is its weight",
+        of=("drawn", "promise-now", "truth-now"),
+    ),
+    Mark("dashed", "truth", "below, the true advantage of an action", of=("advantage",)),
+    Mark("area", "now", "the new policy’s density, not to scale", of=("new",)),
+    Mark("thin", "line", "below, the old policy’s density, not to scale", of=("old",)),
+)
+"""What the marks mean that the table does not name."""
 
 _STEPS, _DRAWS, _NOISE, _BATCH = (0, 100), (10, 200), (0.0, 1.0), (1, 20)
 _STEP_KL, _BRAKE = 0.001, 0.03
@@ -176,7 +191,7 @@ def one_batch(steps: int = 60, draws: int = 20, noise: float = 1.0, batch: int =
         controls=(
             slider("steps", "steps on the batch", *_STEPS, steps, 1, digits=0),
             slider("draws", "draws in the batch", *_DRAWS, draws, 10, digits=0),
-            slider("noise", "noise of an advantage", *_NOISE, noise, 0.1),
+            slider("noise", "noise of an advantage [std.]", *_NOISE, noise, 0.1),
             slider("batch", "which batch", *_BATCH, batch, 1, digits=0),
         ),
         plots=(_course(), _weighted()),
@@ -184,12 +199,13 @@ def one_batch(steps: int = 60, draws: int = 20, noise: float = 1.0, batch: int =
         rows={
             "promise": CURVES["promise"].label,
             "truth": CURVES["truth"].label,
-            "effective": "effective sample size",
-            "kl": "KL from the old policy",
-            "at": "after steps",
+            "effective": "effective sample size [draws]",
+            "kl": "KL from the old policy [nats]",
+            "at": "steps taken",
         },
         fallback=lambda: _static(one, steps),
         looks=CURVES,
+        legend=LEGEND,
     )
 
 
@@ -251,7 +267,12 @@ def _static(one: OneBatch, steps: int) -> Figure:
             action, estimate, s=size, facecolors="none", edgecolors=CURVES["promise"].color, linewidths=1.5
         )
         floor, top = estimate.min() - 1.0, estimate.max() + 0.5
-        density = np.minimum(1.0, 0.3 * one.motor.sigma / sigma * np.exp(-(((x - mu) / sigma) ** 2) / 2))
-        axes[1].fill_between(x, floor, floor + (top - floor) * density, color=CURVES["now"].color, alpha=0.25)
+        new, old = (
+            floor
+            + (top - floor) * np.minimum(1.0, 0.3 * one.motor.sigma / s * np.exp(-(((x - m) / s) ** 2) / 2))
+            for m, s in ((mu, sigma), (0.0, one.motor.sigma))
+        )
+        axes[1].fill_between(x, floor, new, color=CURVES["now"].color, alpha=0.25)
+        axes[1].plot(x, old, color="#5F6770", linestyle="-", linewidth=1)
         axes[1].set(xlabel="action", ylabel="advantage", xlim=(-2, 2), ylim=(floor, top))
     return fig

@@ -1,4 +1,4 @@
-// PPO's clipped surrogate of one step, min(r A, clip(r, 1 - eps, 1 + eps) A), over the ratio r.
+// PPO's clipped surrogate of one step, min(r A, clip(r, 1 - eps, 1 + eps) A), over the ratio w, which the code calls r.
 //
 // Everything follows from one line: the smaller of the two is min(r A, A + eps |A|). It is flat where sign(A) (r - 1)
 // has passed eps, and has the slope A everywhere else.

@@ -21,13 +21,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.learning.ppo import clipped_surrogate
 
 __all__ = ["CURVES", "ppo_clip", "surrogate_and_slope"]
 
 CURVES: dict[str, figures.FamilyStyle] = {
-    "unclipped": figures.FamilyStyle("r Â", "#A8330A", "#DD5B33", "--", "s"),
-    "clipped": figures.FamilyStyle("clip(r) Â", "#CC7E14", "#FFD394", "-.", "D"),
+    "unclipped": figures.FamilyStyle("w Â", "#A8330A", "#DD5B33", "--", "s"),
+    "clipped": figures.FamilyStyle("clip(w) Â", "#CC7E14", "#FFD394", "-.", "D"),
     "smaller": figures.FamilyStyle("the smaller", "#4B1E78", "#A98BF0", "-", "o"),
 }
 """The two candidates and the surrogate, and the look of each."""
@@ -41,12 +42,12 @@ def surrogate_and_slope(
     """Return the clipped surrogate at some ratios, and its derivative in the ratio.
 
     Args:
-        ratio: r, `[...]`, positive.
+        ratio: w, `[...]`, positive.
         advantage: Â.
         clip_range: ε.
 
     Returns:
-        min(r Â, clip(r, 1 − ε, 1 + ε) Â) and its derivative, `[...]` each.
+        min(w Â, clip(w, 1 − ε, 1 + ε) Â) and its derivative, `[...]` each.
 
     Example:
         >>> value, slope = surrogate_and_slope([0.5, 1.0, 1.5], advantage=-1.0, clip_range=0.2)
@@ -60,16 +61,16 @@ def surrogate_and_slope(
 
 
 def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2) -> Explorable:
-    """Show the clipped surrogate of one step, with its two candidates, over r, Â and ε.
+    """Show the clipped surrogate of one step, with its two candidates, over w, Â and ε.
 
     Args:
-        ratio: Initial r, in [0, 2.5].
+        ratio: Initial w, in [0, 2.5].
         advantage: Initial Â, in [-2, 2].
         clip_range: Initial ε, in [0.02, 0.5].
 
     Returns:
-        An explorable with the three curves against r, the point where the step stands, and a table of value, slope,
-        and gain over r = 1.
+        An explorable with the three curves against w, the point where the step stands, and a table of value, slope,
+        and gain over w = 1.
 
     Raises:
         ValueError: If a value lies outside its slider.
@@ -85,7 +86,7 @@ def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2
             "ratio in [0, 2.5], advantage in [-2, 2], clip_range in [0.02, 0.5]"
         )
     here, slope = surrogate_and_slope(max(ratio, 1e-9), advantage, clip_range)
-    fig = plot("ratio r", "surrogate of one step", _RATIO, "y")
+    fig = plot("ratio w", "surrogate of one step", _RATIO, "y")
     for edge in ("lower", "upper"):
         source = ColumnDataSource({"x": [], "y": []}, name=edge)
         fig.line("x", "y", source=source, name="line", line_width=1)
@@ -97,21 +98,25 @@ def ppo_clip(ratio: float = 1.5, advantage: float = 1.0, clip_range: float = 0.2
         name="ppo-clip",
         title="the clipped surrogate of one step, over ratio, advantage and clip range",
         alt=(
-            "Three lines against the ratio r: r times the advantage, its clipped version, and the smaller of both, "
+            "Three lines against the ratio w: w times the advantage, its clipped version, and the smaller of both, "
             "which follows the first up to a corner at one end of the interval 1 ± ε and is flat beyond. "
-            f"At r = {ratio:g}, advantage {advantage:g}, ε = {clip_range:g} the surrogate is {float(here):.2f} "
+            f"At w = {ratio:g}, advantage {advantage:g}, ε = {clip_range:g} the surrogate is {float(here):.2f} "
             f"and its slope {float(slope):.2f}."
         ),
         controls=(
-            slider("ratio", "ratio r", *_RATIO, ratio, 0.05),
+            slider("ratio", "ratio w", *_RATIO, ratio, 0.05),
             slider("advantage", "advantage Â", *_ADVANTAGE, advantage, 0.1),
             slider("clip_range", "clip range ε", *_CLIP_RANGE, clip_range, 0.02),
         ),
         plots=(fig,),
         columns={name: look.label for name, look in CURVES.items()},
-        rows={"value": "value", "slope": "slope in r", "gain": "gain over r = 1"},
+        rows={"value": "value", "slope": "slope in w", "gain": "gain over w = 1"},
         fallback=lambda: _static(ratio, advantage, clip_range),
         looks=CURVES,
+        legend=(
+            Mark("upright", "line", "ends of the interval, 1 − ε and 1 + ε", of=("lower", "upper")),
+            Mark("ring", "smaller", "your step: the surrogate at your ratio", of=("here",)),
+        ),
     )
 
 
@@ -130,6 +135,6 @@ def _static(ratio: float, advantage: float, clip_range: float) -> Figure:
             ax.plot(r, values, color=look.color, linestyle=look.linestyle, label=look.label)
         at = np.interp(ratio, r, drawn["smaller"])
         ax.plot([ratio], [at], "o", color=CURVES["smaller"].color, markerfacecolor="none", ms=10, mew=2)
-        ax.set(xlabel="ratio r", ylabel="surrogate of one step", xlim=_RATIO)
+        ax.set(xlabel="ratio w", ylabel="surrogate of one step", xlim=_RATIO)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=3)
     return fig

@@ -26,6 +26,7 @@ from torch.distributions import Normal
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import DASHES, Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 
 __all__ = ["POLICIES", "StepOfReinforce", "reinforce_step"]
 
@@ -35,6 +36,21 @@ POLICIES: dict[str, figures.FamilyStyle] = {
     "exact": figures.FamilyStyle("after the exact step", "#4B1E78", "#A98BF0", "-", "o"),
 }
 """The policy before and after a step, and the look of each."""
+
+LEGEND = (
+    Mark("line", "ink", "first plot: the reward", of=("reward",)),
+    Mark("dotted", "ink", "the baseline", of=("baseline",)),
+    Mark(
+        "ring",
+        "sampled",
+        "the draws of this batch; in the last plot its gradient",
+        of=("draws", "end-sampled", "arrow-sampled"),
+    ),
+    Mark("ring", "exact", "the exact gradient", of=("end-exact", "arrow-exact")),
+    Mark("small ring", "sampled", "the gradients of 200 batches", of=("cloud",)),
+    Mark("oval", "exact", "two standard deviations about the exact gradient", of=("ellipse",)),
+)
+"""What the marks mean that the table does not name."""
 
 _WIDTH = 0.8
 _LATENTS, _GRADIENTS = (-4.0, 4.0), (-1.6, 1.6)
@@ -166,7 +182,7 @@ def reinforce_step(
         controls=(
             slider("draws", "draws in a batch", *_DRAWS, draws, 1, digits=0),
             slider("batch", "which batch", *_BATCH, batch, 1, digits=0),
-            slider("share", "baseline, share of the mean", *_SHARE, share, 0.1),
+            slider("share", "baseline, share of the mean reward", *_SHARE, share, 0.1),
             slider("peak", "best latent", *_PEAK, peak, 0.1),
             slider("rate", "learning rate", *_RATE, rate, 0.05),
         ),
@@ -183,6 +199,7 @@ def reinforce_step(
         },
         fallback=lambda: _static(step),
         looks=POLICIES,
+        legend=LEGEND,
     )
 
 
@@ -257,7 +274,14 @@ def _static(step: StepOfReinforce) -> Figure:
         below.plot(*cloud, ".", color=POLICIES["sampled"].color, alpha=0.5, rasterized=True)
         for name, found in gradients.items():
             ends = np.stack([np.zeros(2), found.numpy()], axis=1)
-            below.plot(*ends, color=POLICIES[name].color, linestyle="-", marker="o", markevery=[1])
+            below.plot(
+                *ends, "-o", color=POLICIES[name].color, markerfacecolor="none", markevery=[1], ms=9, mew=2
+            )
+        angle = torch.linspace(0, 2 * math.pi, 73, dtype=torch.float64)
+        around = 2 * torch.linalg.cholesky(step.covariance()) @ torch.stack([angle.cos(), angle.sin()])
+        below.plot(
+            *(gradients["exact"][:, None] + around), color=POLICIES["exact"].color, linestyle="-", linewidth=1
+        )
         below.set(xlabel="gradient in μ", ylabel="gradient in log σ", xlim=_GRADIENTS, ylim=_GRADIENTS)
         below.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1))
     return fig

@@ -26,6 +26,7 @@ from torch.distributions import Normal
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.distributions import ClippedNormal
 
 __all__ = ["ESTIMATORS", "OneStep", "score_estimators"]
@@ -165,6 +166,7 @@ def score_estimators(
         },
         fallback=lambda: _static(step),
         looks=ESTIMATORS,
+        legend=(Mark("upright", "line", "your μ", of=("at-mean", "at-std")),),
     )
 
 

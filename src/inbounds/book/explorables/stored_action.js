@@ -44,13 +44,14 @@ inbounds.models["stored-action"] = ({ z, noise, log_sigma, form }) => {
     return `${digits}·10${power.replace("+", "").replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]))}`;
   };
   const error = Math.abs(recalled - z);
+  const about = (v) => (v < 1e-12 ? "less than 10⁻¹²" : short(v)); // the browser counts in float64 itself
   const note = lost
     ? `The stored action is the bound itself, as for every latent above ${number(cell[0], 1)}. The latent that comes ` +
       "back is infinite, and with it the score; the ratio is 0."
     : `The stored action is ${steps < 1e6 ? steps : short(steps)} ` +
-      `spacing${steps === 1 ? "" : "s"} below the bound, as for all latents in an interval of length ` +
-      `${short(cell[1] - cell[0])}. The latent comes back off by ${short(error)}, which is ${short(error / sigma)} σ: ` +
-      `the ratio at unchanged parameters, which should be 1, is off by ${short(Math.abs(ratio - 1))}.`;
+      `representable number${steps === 1 ? "" : "s"} below the bound, as for all latents in an interval of length ` +
+      `${about(cell[1] - cell[0])}. The latent comes back off by ${about(error)}, which is ${about(error / sigma)} σ: ` +
+      `the ratio at unchanged parameters, which should be 1, is off by ${about(Math.abs(ratio - 1))}.`;
   return {
     sources: {
       density: { x, y: x.map(density) },

@@ -24,14 +24,24 @@ from numpy.typing import NDArray
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 
 __all__ = ["FORMATS", "LATENTS", "StoredAction", "stored_action"]
 
 LATENTS: dict[str, figures.FamilyStyle] = {
     "drawn": figures.FamilyStyle("drawn", "#4B1E78", "#A98BF0", "-", "o"),
-    "recalled": figures.FamilyStyle("from the record", "#CC7E14", "#FFD394", "--", "D"),
+    "recalled": figures.FamilyStyle("from the stored action", "#CC7E14", "#FFD394", "--", "D"),
 }
 """The latent that was drawn and the one that the record gives back, and the look of each."""
+
+LEGEND = (
+    Mark("line", "line", "the policy’s density", of=("density",)),
+    Mark("ring", "ink", "either latent, as high as its density", of=tuple(f"{name}-top" for name in LATENTS)),
+    Mark("ticks", "line", "latents that a stored action can give back", of=("ticks",)),
+    Mark("area", "line", "so many of them that their ticks would touch", of=("dense",)),
+    Mark("area", "recalled", "latents that share this stored action", of=("cell",)),
+)
+"""What the marks mean that the table does not name."""
 
 FORMATS = {"bfloat16": 8, "float16": 11, "float32": 24, "float64": 53}
 """Significant bits of each format."""
@@ -159,13 +169,14 @@ def stored_action(
         },
         fallback=lambda: _static(stored),
         looks=LATENTS,
+        legend=LEGEND,
     )
 
 
 def _formats(form: str) -> Slider:
     """Return the slider over the formats, which shows their names."""
     names = list(FORMATS)
-    choice = slider("form", "format of the record", 0, len(names) - 1, names.index(form), 1)
+    choice = slider("form", "number format of the stored action", 0, len(names) - 1, names.index(form), 1)
     choice.format = CustomJSTickFormatter(code=f"return {names}[Math.round(tick)]")
     return choice
 
@@ -217,9 +228,7 @@ def _static(stored: StoredAction) -> Figure:
             if math.isfinite(at):
                 look = LATENTS[name]
                 ax.plot([at, at], [0, float(density(at))], look.linestyle, color=look.color, label=look.label)
-                ax.plot(
-                    [at], [float(density(at))], look.marker, color=look.color, markerfacecolor="none", ms=9
-                )
+                ax.plot([at], [float(density(at))], "o", color=look.color, markerfacecolor="none", ms=9)
         ax.set(xlabel="latent z", ylabel="density of the latent", xlim=(left, right), ylim=(0, None))
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=2)
     return fig

@@ -91,6 +91,10 @@ inbounds.models["trust-region"] = ({ log_sigma, peak, log_max_kl }) => {
   const share = (kept) => (kept === 1 ? "all" : kept ? `1/${1 / kept}` : "nothing");
   const cost = 1 / (2 * sigma * sigma);
   const part = found.plain.predicted / found.natural.predicted;
+  const towards = names.map((name) => along(found[name].step, 1 / Math.hypot(...found[name].step)));
+  const alike = Math.abs(towards[0][0] * towards[1][1] - towards[0][1] * towards[1][0]) < 0.05; // less than 3° in the picture
+  const idle = towards[1].findIndex((move) => Math.abs(move) < 0.05); // a parameter that the natural step leaves alone
+  const promised = part > 0.9995 ? "more than 99.9" : number(100 * part, part > 0.995 ? 1 : 0);
   const { exact, kept } = found.natural;
   return {
     sources,
@@ -103,13 +107,15 @@ inbounds.models["trust-region"] = ({ log_sigma, peak, log_max_kl }) => {
       kept: names.map((name) => share(found[name].kept)),
     },
     note:
-      `At σ = ${number(sigma, 2)} a change of μ costs ${number(cost, 1) === "1.0" ? "" : `${number(cost, 1)} times `}as many nats as an equal change of log σ. ` +
-      (part > 0.995
-        ? "Here the plain gradient points nearly where the natural one does. "
-        : `The plain gradient does not see that: at the same quadratic divergence it is promised ${number(100 * part, 0)}\u00a0% of the natural step's gain. `) +
+      `At σ = ${number(sigma, 2)} a change of μ costs ${cost < 1.05 ? "" : `${number(cost, cost < 10 ? 1 : 0)} times `}as many nats as an equal change of log σ. ` +
+      (!alike
+        ? `The plain gradient does not see that, and points elsewhere: at the same quadratic divergence it is promised ${promised}\u00a0% of the natural step's gain. `
+        : idle < 0
+          ? "Here the plain gradient points nearly where the natural one does. "
+          : `Here both gradients leave ${["μ", "log σ"][idle]} nearly alone, and point the same way. `) +
       (kept === 1
         ? "The natural step's exact divergence is within the bound, and the line search keeps all of it."
-        : `The natural step's exact divergence is ${number(exact / maxKl, 2)} times the bound, and the line search keeps ${share(kept)} of it.`),
+        : `The natural step's exact divergence is ${exact < 1.005 * maxKl ? "just above" : `${number(exact / maxKl, 2)} times`} the bound, and the line search keeps ${share(kept)} of it.`),
     found, // for the tests
   };
 };

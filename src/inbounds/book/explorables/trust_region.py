@@ -26,6 +26,7 @@ from torch import Tensor
 
 from inbounds.book.drawing import figures
 from inbounds.book.explorables.frame import Explorable, curve, plot, slider
+from inbounds.book.explorables.legend import Mark
 from inbounds.learning.families import FAMILIES, NormalParameters
 
 __all__ = ["REGIONS", "STEPS", "OneMotor", "trust_region"]
@@ -41,6 +42,15 @@ REGIONS: dict[str, figures.FamilyStyle] = {
     "exact": figures.FamilyStyle("KL, exact", "#CC7E14", "#FFD394", "-", "D"),
 }
 """The two trust regions, and the look of their edges."""
+
+LEGEND = (
+    Mark("dotted", "quadratic", "where the quadratic KL reaches the bound", of=("quadratic",)),
+    Mark("area", "exact", "where the exact KL is within it", of=("exact",)),
+    Mark("thin", "line", "steps of equal predicted gain", of=("level",)),
+    Mark("ring", "ink", "the end of a step", of=tuple(f"{name}-end" for name in STEPS)),
+    Mark("dot", "ink", "what the line search keeps of it", of=tuple(f"{name}-kept" for name in STEPS)),
+)
+"""What the marks mean that the table does not name."""
 
 _SIGMA, _PEAK, _MAX_KL = (0.1, math.exp(-0.35)), (-1.0, 1.0), (0.01, 0.5)
 _LAW = FAMILIES["gaussian"].law
@@ -98,6 +108,21 @@ class OneMotor:
             name: (x * (2 * self.max_kl / (x @ fisher @ x)).sqrt()).numpy() for name, x in directions.items()
         }
 
+    def kept(self, step: NDArray[np.float64]) -> float:
+        """Return the share of a step that a line search keeps: halved until KL and gain allow it, at most nine times.
+
+        Example:
+            >>> motor = OneMotor(sigma=0.25, peak=0.1, max_kl=0.1)
+            >>> [motor.kept(step) for step in motor.steps().values()]
+            [0.5, 0.5]
+        """
+        start = self.worth(torch.zeros(2, dtype=torch.float64))
+        for share in 0.5 ** np.arange(10.0):
+            tried = torch.from_numpy(share * step)
+            if self.kl(tried) <= self.max_kl and self.worth(tried) > start:
+                return float(share)
+        return 0.0
+
     def edge(self, points: int = 241) -> NDArray[np.float64]:
         """Return steps `[points, 2]` on the edge of the exact region KL ≤ D_max, found by bisection along rays."""
         angle = torch.linspace(0, 2 * math.pi, points, dtype=torch.float64)
@@ -147,10 +172,10 @@ def trust_region(sigma: float = 0.25, peak: float = 0.1, max_kl: float = 0.1) ->
             f"{max_kl:g} nats the plain step is promised {plain:.3f}, the natural step {natural:.3f}."
         ),
         controls=(
-            slider("log_sigma", "scale σ", -2.3, -0.35, math.log(sigma), 0.05, log=True),
-            slider("peak", "best action, from μ", *_PEAK, peak, 0.05),
+            slider("log_sigma", "scale σ (logarithmic)", -2.3, -0.35, math.log(sigma), 0.05, log=True),
+            slider("peak", "best action minus μ", *_PEAK, peak, 0.05),
             slider(
-                "log_max_kl", "bound on the KL, nats", -4.6, -0.7, math.log(max_kl), 0.1, log=True, digits=3
+                "log_max_kl", "bound on the KL [nats]", -4.6, -0.7, math.log(max_kl), 0.1, log=True, digits=3
             ),
         ),
         plots=(_plane(),),
@@ -158,11 +183,12 @@ def trust_region(sigma: float = 0.25, peak: float = 0.1, max_kl: float = 0.1) ->
         rows={
             "predicted": "predicted gain",
             "gain": "true gain",
-            **{name: look.label for name, look in REGIONS.items()},
+            **{name: f"{look.label} [nats]" for name, look in REGIONS.items()},
             "kept": "line search keeps",
         },
         fallback=lambda: _static(motor),
         looks=STEPS | REGIONS,
+        legend=LEGEND,
     )
 
 
@@ -210,6 +236,7 @@ def _static(motor: OneMotor) -> Figure:
             look = STEPS[name]
             ax.plot([0, step[0]], [0, step[1]], color=look.color, linestyle=look.linestyle, label=look.label)
             ax.plot(*step, "o", color=look.color, markerfacecolor="none", ms=10, mew=2)
+            ax.plot(*(motor.kept(step) * step), "o", color=look.color, ms=6)
         ax.axline(step, step + np.array([-slope[1], slope[0]]), color="#5F6770", linewidth=1)
         ax.set(
             xlabel="change of μ",

@@ -44,7 +44,7 @@ from inbounds.study.words import side, spoken
 
 STARTS = {
     "equal": "from an equally quiet start",
-    "standard": "as they come",
+    "standard": "from the usual starts",
     "loud": "from an equally loud start",
     "printed": "as the thesis prints",
 }
@@ -54,7 +54,7 @@ EVERY = 10
 _ARMS = {
     "standard": ("standard", "beyond"),
     "printed": ("printed",),
-}  # CAPG stands beside the families as they come
+}  # CAPG stands beside the families from their usual starts
 Row = Evidence | Compared
 
 

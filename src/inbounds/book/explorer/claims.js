@@ -8,6 +8,7 @@
     const lines = [...box.querySelectorAll("details[data-verdict]")];
     const buttons = [...box.querySelectorAll("button[data-verdict]")];
     const menu = box.querySelector("select");
+    const again = box.querySelector(".claims-all"); // the way out of a choice that nothing answers to
     const chosen = new Set();
 
     function show() {
@@ -22,7 +23,14 @@
         button.lastElementChild.textContent = lines.filter((line) => of(line) && (!verdict || line.dataset.verdict === verdict)).length;
       }
       const told = [[...chosen].join(", "), menu.value].filter(Boolean).join("; ");
+      again.hidden = lines.some(wanted);
       box.querySelector("[role=status]").textContent = `${lines.filter(wanted).length} of ${lines.length} claims${told ? `: ${told}` : ""}.`;
+    }
+
+    function all() {
+      chosen.clear();
+      if (menu) menu.value = "";
+      show();
     }
 
     for (const button of buttons) {
@@ -34,14 +42,16 @@
       });
     }
     menu?.addEventListener("change", show);
+    again?.addEventListener("click", () => {
+      all();
+      buttons[0].focus();
+    });
 
     // A link to a claim opens it, whatever is chosen.
     const follow = () => {
       const line = lines.find(({ id }) => id === decodeURIComponent(location.hash.slice(1)));
       if (!line) return;
-      chosen.clear();
-      if (menu) menu.value = "";
-      show();
+      all();
       line.open = true;
       line.scrollIntoView();
     };

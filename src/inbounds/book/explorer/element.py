@@ -102,7 +102,7 @@ def study_explorer(outcomes: Outcomes, **first: Any) -> StudyExplorer:
 
 
 def _static(outcomes: Outcomes, first: Mapping[str, Any]) -> str:
-    """Return the learning curves of the first choice, as they come, as a picture, with as few epochs as it takes."""
+    """Return the curves of the first choice, from the usual starts, as a picture, with as few epochs as it takes."""
     algorithm = first["algorithm"]
     begun = {
         robot: {family: outcome for family, outcome in row.items() if family in first["families"]}
@@ -128,7 +128,7 @@ def _static(outcomes: Outcomes, first: Mapping[str, Any]) -> str:
         robot: {family: estimate(o, "final") if o else None for family, o in row.items()}
         for robot, row in begun.items()
     }
-    what = f"Learning curves, {algorithm.upper()}, as they come, a panel per robot"
+    what = f"Learning curves, {algorithm.upper()}, from the usual starts, a panel per robot"
     alt = f"{what}. Mean final returns: {in_words(finals)}"
     picture = base64.b64encode(svg_bytes(fig)).decode("ascii")
     plt.close(fig)

@@ -107,7 +107,7 @@ def reports(first: ArrayLike, second: ArrayLike, picked: tuple[int, int] = (TICK
 
 
 def pairs(outcomes: Outcomes) -> Iterator[tuple[Compared, list[NDArray[np.float64]]]]:
-    """Yield the finished differences of the families as they come, final return, each with the results of both sides.
+    """Yield the finished differences from the usual starts, final return, each with the results of both sides.
 
     Example:
         >>> from inbounds.study.store import StudyFolder

@@ -198,7 +198,7 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
     if lent := sorted({f"{row.robot} ({row.algorithm.upper()})" for row in rows if row.as_it_comes}):
-        said.append(f"The bounded law starts as it comes, nearly as quiet: {', '.join(lent)}.")
+        said.append(f"The bounded law has its usual start, nearly as quiet: {', '.join(lent)}.")
     return " ".join(said)
 
 

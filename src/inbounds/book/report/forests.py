@@ -55,11 +55,11 @@ SERIES: Mapping[str, Series] = MappingProxyType(
             )
         },
         "gaussian": Series(
-            "Gaussian, quiet − as it comes", LOOKS["gaussian"].color, LOOKS["gaussian"].marker
+            "Gaussian, quiet − usual start", LOOKS["gaussian"].color, LOOKS["gaussian"].marker
         ),
         "logit-normal, beta": Series("Logit-normal − Beta", SHADES[2], "v"),
         "logit-normal, clipped-gaussian": Series("Logit-normal − CAPG", SHADES[1], "P"),
-        "as they come": Series("as they come", SHADES[0], "s"),
+        "usual starts": Series("usual starts", SHADES[0], "s"),
         "both quiet": Series("both quiet", SHADES[3], "X"),
         "both loud": Series("both loud", SHADES[1], "D"),
     }

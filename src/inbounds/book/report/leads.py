@@ -1,4 +1,4 @@
-"""What is left of a bounded law's lead once both sides start alike: as they come, both quiet, both loud.
+"""What is left of a bounded law's lead once both sides start alike: usual starts, both quiet, both loud.
 
 show = leads(outcomes_of_both(study_pages.shipped()))
 """
@@ -33,7 +33,7 @@ class Lead:
     law: str
     endpoint: str
     start: str
-    """as they come, both quiet or both loud."""
+    """usual starts, both quiet or both loud."""
     difference: Estimate
     """Law minus Gaussian."""
 
@@ -72,7 +72,7 @@ def leads_of(outcomes: Outcomes) -> list[Lead]:
             row.contrast.algorithm,
             row.contrast.first,
             row.endpoint,
-            "as they come",
+            "usual starts",
             row.difference,
         )
         for row in rows
@@ -95,9 +95,9 @@ def leads(outcomes: Outcomes) -> Shown:
     panels = {name: _bars(found, endpoint) for endpoint, name in ENDPOINTS.items()}
     alt = f"Law minus Gaussian with 95 percent intervals, by the kind of start. {in_words(panels)}"
     caption = (
-        "Law minus Gaussian, where that is found above 0 as the families come. Bars: 95 % bootstrap intervals, not "
+        "Law minus Gaussian, where that is found above 0 from the usual starts. Bars: 95 % bootstrap intervals, not "
         "corrected. Both quiet: executed noise 0.4 before training; on some robots only the Gaussian was made quiet, "
-        "the law being nearly so as it comes. Both loud: the logit-normal executes 0.7, the Gaussian 0.72. Grey: too "
+        "the law being nearly so. Both loud: the logit-normal executes 0.7, the Gaussian 0.72. Grey: too "
         "small to choose by. A bar that is not there is an experiment that nobody has run."
     )
     return html.of_study(what, html.figure_of(of_robots(panels), alt, caption))

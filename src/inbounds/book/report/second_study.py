@@ -33,7 +33,7 @@ BLOCKS = {
     "B": "B: equal start, PPO",
     "B, more seeds": "B: ten more seeds of the primary columns",
     "C": "C: equal start, TRPO",
-    "D": "D: the Gaussian with a free σ as it comes",
+    "D": "D: the Gaussian with a free σ, usual start",
     "E": "E: other noise",
     "F": "F: other step sizes",
 }
@@ -152,7 +152,7 @@ def equal_starts(outcomes: Outcomes) -> Shown:
                 cell.robot,
                 f"{cell.algorithm.upper()}: {column_name(column)}",
                 f"{start['action_std']:.3f}",
-                "as it comes" if asked is None else f"{asked:g}{', failed' if failed else ''}",
+                "usual" if asked is None else f"{asked:g}{', failed' if failed else ''}",
                 percent(start["saturation"], 1),
                 f"{start['return']:.0f}".replace("-", "−"),
                 cell.arm,
