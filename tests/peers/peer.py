@@ -27,6 +27,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm  # no
 from stable_baselines3.common.type_aliases import RolloutBufferSamples  # noqa: E402
 
 ENV = "Hopper-v5"  # its box is [−1, 1]: unit actions and actions are the same numbers
+ACT_DIM = 3
 TASK_LENGTH = 9  # steps until truncation; the untrained Hopper falls after about twenty
 
 
@@ -82,6 +83,29 @@ def their_side(
     peer.policy.double()
     peer.set_logger(configure(format_strings=[]))
     return peer
+
+
+def ppo_settings(algorithm: Any) -> dict[str, Any]:
+    """Return what only PPO has, under the peer's names."""
+    return {
+        "n_epochs": algorithm.num_epochs,
+        "clip_range": algorithm.clip_range,
+        "ent_coef": algorithm.entropy_coef,
+        "vf_coef": algorithm.value_coef,
+        "max_grad_norm": algorithm.max_grad_norm,
+    }
+
+
+def trpo_settings(algorithm: Any) -> dict[str, Any]:
+    """Return what only TRPO has, under the peer's names. Its KL is the mean over action dimensions."""
+    return {
+        "n_critic_updates": algorithm.num_epochs,
+        "target_kl": algorithm.max_kl / ACT_DIM,
+        "cg_damping": algorithm.damping / ACT_DIM,
+        "cg_max_steps": algorithm.cg_iters,
+        "line_search_shrinking_factor": algorithm.backtrack_coef,
+        "line_search_max_iter": algorithm.max_backtracks,
+    }
 
 
 def shuffler(seed: int) -> np.random.RandomState:

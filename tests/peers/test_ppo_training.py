@@ -15,7 +15,7 @@ import torch
 
 from inbounds.learning import Trainer, preset
 from inbounds.learning.seeding import SeedStreams
-from tests.peers.peer import largest_difference, our_weights, their_side
+from tests.peers.peer import largest_difference, our_weights, ppo_settings, their_side
 
 ENV, SEEDS, EPOCHS, HORIZON = "HalfCheetah-v5", (0, 1), 5, 448
 """Five rollouts that do not divide the robot's 1000 steps: two truncations, in mid-rollout."""
@@ -56,11 +56,7 @@ def test_training_moves_every_weight_as_the_peers_does(
     peer = their_side(
         PPO,
         trainer.config,
-        n_epochs=algorithm.num_epochs,
-        clip_range=algorithm.clip_range,
-        ent_coef=algorithm.entropy_coef,
-        vf_coef=algorithm.value_coef,
-        max_grad_norm=algorithm.max_grad_norm,
+        **ppo_settings(algorithm),
         env=gymnasium.wrappers.TransformAction(gymnasium.make(ENV), lambda a: a.astype(np.float32), None),
     )
     peer.policy.load_state_dict(first[SEEDS[row]])

@@ -25,7 +25,16 @@ import pytest
 import torch
 
 from inbounds.learning import ppo, preset
-from tests.peers.peer import ENV, hand_over, largest_difference, our_side, our_weights, shuffler, their_side
+from tests.peers.peer import (
+    ENV,
+    hand_over,
+    largest_difference,
+    our_side,
+    our_weights,
+    ppo_settings,
+    shuffler,
+    their_side,
+)
 
 SEEDS = (0, 1, 2)
 
@@ -68,11 +77,7 @@ def test_ten_epochs_of_minibatches_move_every_weight_as_the_peer_does(config, th
         peer = their_side(
             their_kind,
             config,
-            n_epochs=algorithm.num_epochs,
-            clip_range=algorithm.clip_range,
-            ent_coef=algorithm.entropy_coef,
-            vf_coef=algorithm.value_coef,
-            max_grad_norm=algorithm.max_grad_norm,
+            **ppo_settings(algorithm),
         )
         hand_over(peer, networks, rollout, s)
         np.random.set_state(shuffler(s).get_state())  # noqa: NPY002

@@ -29,8 +29,10 @@ from tests.peers.peer import (
     largest_difference,
     our_side,
     our_weights,
+    ppo_settings,
     shuffler,
     their_side,
+    trpo_settings,
 )
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
@@ -132,11 +134,7 @@ def test_ppo_s_update_is_the_peer_s(config: TrainConfig, monkeypatch: pytest.Mon
     peer = their_side(
         PPO,
         config,
-        n_epochs=algorithm.num_epochs,
-        clip_range=algorithm.clip_range,
-        ent_coef=algorithm.entropy_coef,
-        vf_coef=algorithm.value_coef,
-        max_grad_norm=algorithm.max_grad_norm,
+        **ppo_settings(algorithm),
     )
     before = our_weights(parts[4], ONLY)
     hand_over(peer, parts[4], as_rollout(parts[4], parts[3]), ONLY)
@@ -160,12 +158,7 @@ def test_trpo_s_update_is_the_peer_s(monkeypatch: pytest.MonkeyPatch) -> None:
     peer = their_side(
         TRPO,
         config,
-        n_critic_updates=algorithm.num_epochs,
-        target_kl=algorithm.max_kl / test_trpo_step.ACT_DIM,
-        cg_damping=algorithm.damping / test_trpo_step.ACT_DIM,
-        cg_max_steps=algorithm.cg_iters,
-        line_search_shrinking_factor=algorithm.backtrack_coef,
-        line_search_max_iter=algorithm.max_backtracks,
+        **trpo_settings(algorithm),
     )
     before = our_weights(parts[4], ONLY)
     hand_over(peer, parts[4], as_rollout(parts[4], parts[3]), ONLY)

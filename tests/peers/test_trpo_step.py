@@ -28,10 +28,19 @@ import pytest
 import torch
 
 from inbounds.learning import preset, trpo
-from tests.peers.peer import ENV, hand_over, largest_difference, our_side, our_weights, shuffler, their_side
+from tests.peers.peer import (
+    ACT_DIM,
+    ENV,
+    hand_over,
+    largest_difference,
+    our_side,
+    our_weights,
+    shuffler,
+    their_side,
+    trpo_settings,
+)
 
 SEEDS = (0, 1, 2)
-ACT_DIM = 3  # of the Hopper
 
 
 @pytest.fixture
@@ -71,12 +80,7 @@ def both(config):
         peer = their_side(
             TRPO,
             config,
-            n_critic_updates=algorithm.num_epochs,
-            target_kl=algorithm.max_kl / ACT_DIM,
-            cg_damping=algorithm.damping / ACT_DIM,
-            cg_max_steps=algorithm.cg_iters,
-            line_search_shrinking_factor=algorithm.backtrack_coef,
-            line_search_max_iter=algorithm.max_backtracks,
+            **trpo_settings(algorithm),
         )
         hand_over(peer, trainer.networks, rollout, s)
         np.random.set_state(shufflers[s].get_state())  # noqa: NPY002
