@@ -89,6 +89,8 @@
     };
     const stop = () => films.forEach((film) => film.pause());
     for (const film of films) {
+      film.addEventListener("play", () => { film.dataset.plays = ""; });
+      film.addEventListener("pause", () => { if (!film.ended) delete film.dataset.plays; });
       film.addEventListener("ended", () => {
         if (!wanted || !films.every((each) => each.ended)) return;
         for (const each of films) each.currentTime = 0;

@@ -55,6 +55,22 @@ def test_out_of_sight_they_rest(front: Page) -> None:
     front.wait_for_function(PLAYING)
 
 
+BAND = f"getComputedStyle({FILMS}[0]).backgroundColor"
+
+
+def test_the_dark_band_is_there_with_the_controls_only(front: Page) -> None:
+    front.wait_for_function(PLAYING)
+    none = "rgba(0, 0, 0, 0)"
+    assert front.evaluate(BAND) == none
+    front.locator(".inbounds-loop video").first.hover()
+    assert front.evaluate(BAND) != none
+    front.mouse.move(0, 0)
+    assert front.evaluate(BAND) == none
+    front.evaluate(f"{FILMS}[0].pause()")
+    front.wait_for_function(PAUSED)
+    front.wait_for_function(f"{BAND} !== '{none}'")
+
+
 def test_who_wants_less_motion_sees_them_still(context: BrowserContext, address: str) -> None:
     page = context.new_page()
     page.emulate_media(reduced_motion="reduce")
