@@ -66,7 +66,8 @@ on_path() {
 install_browsers() {
   case "$1" in --with-chromium | --with-browsers)
     on_path "${INBOUNDS_CHROMIUM:-}" chromium chromium-browser google-chrome google-chrome-stable chrome ||
-      install_system_packages .venv/bin/python chromium ;;
+      install_system_packages .venv/bin/python chromium
+    install_system_packages .venv/bin/python libatomic1 ;;  # for the node that Playwright brings
   esac
   case "$1" in --with-browsers)
     on_path "${INBOUNDS_FIREFOX:-}" firefox-esr firefox || install_system_packages .venv/bin/python firefox-esr ;;
