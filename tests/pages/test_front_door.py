@@ -109,6 +109,6 @@ def test_four_cards_lead_on(front: Page, address: str) -> None:
 
 
 def test_it_says_how_to_cite(front: Page) -> None:
-    entry = front.locator("#how-to-cite .highlight").inner_text()
-    assert entry.startswith("@software{")
+    entry = front.locator("#how-to-cite .highlight").text_content() or ""
+    assert entry.lstrip().startswith("@software{")
     assert "In Bounds" in entry
