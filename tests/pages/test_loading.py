@@ -1,4 +1,4 @@
-"""What a page leaves for later: BokehJS until an explorable is near, and the layout of sections far from the screen."""
+"""What a page leaves for later: BokehJS until an explorable is near. A place that is asked for is found all the same."""
 
 import pytest
 from playwright.sync_api import BrowserContext, Page
@@ -76,15 +76,6 @@ def test_a_page_is_steady_while_it_opens_and_is_read(
         page.wait_for_timeout(50)
     page.wait_for_timeout(500)
     assert page.evaluate("shifts") <= 0.05
-
-
-def test_far_sections_are_laid_out_when_they_are_wanted(context: BrowserContext, address: str) -> None:
-    page = opened(context, address + FAR)
-    end = page.locator(END).last
-    assert not end.evaluate(LAID_OUT)
-    assert page.locator("#what-you-will-know li").first.evaluate(LAID_OUT)
-    page.keyboard.press("Tab")
-    assert end.evaluate(LAID_OUT)
 
 
 @pytest.mark.parametrize("way", ["from another page", "by a link of this page", "again"])
