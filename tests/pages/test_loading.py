@@ -1,4 +1,4 @@
-"""What a page leaves for later: BokehJS until an explorable is near. A place that is asked for is found all the same."""
+"""What a page leaves for later: BokehJS until an explorable is near. A place asked for is found all the same."""
 
 import pytest
 from playwright.sync_api import BrowserContext, Page
