@@ -211,10 +211,6 @@ def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 CHOOSE_THEME = """if (document.documentElement.dataset.theme === "auto")
   document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";"""
 
-# A page that is entered in its middle is laid out as a whole: a place found again must be the same place (see book.js).
-LAY_OUT_ALL = """if (location.hash || performance.getEntriesByType("navigation")[0]?.type !== "navigate")
-  document.documentElement.dataset.whole = "";"""
-
 
 def is_thebe(script: Any) -> bool:
     """Whether a script tag comes from sphinx-thebe: its file, or its inline settings."""
@@ -225,7 +221,6 @@ def is_thebe(script: Any) -> bool:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers (called by Sphinx)."""
     app.add_js_file(None, body=CHOOSE_THEME, priority=1)
-    app.add_js_file(None, body=LAY_OUT_ALL, priority=1)
     app.connect("config-inited", use_named_cache, priority=100)
     app.connect("html-page-context", choose_scripts, priority=900)
     app.connect("html-page-context", let_pages_go_first, priority=950)

@@ -43,13 +43,6 @@
   new MutationObserver(nameMode).observe(root, { attributeFilter: ["data-mode"] });
   nameMode();
 
-  /* Sections far from the screen are not laid out yet (book.css). All of them are for who goes by the Tab key or by a link within the page, and for
-     whoever says "inbounds:everything", such as a test; and from the start on a page entered in its middle (inbounds_book.py). */
-  const layOutAll = () => { root.dataset.whole = ""; };
-  addEventListener("inbounds:everything", layOutAll);
-  addEventListener("keydown", ({ key }) => { if (key === "Tab") layOutAll(); });
-  addEventListener("click", ({ target }) => { if (target.closest?.("a[href*='#']")) layOutAll(); }, { capture: true });
-
   /* The two layers: "read" folds the code of every cell but what stays open, "code" opens it. Pages start open, for who has no scripts. */
   const CODE = "details.inbounds-code";
   const showLayer = () => {
