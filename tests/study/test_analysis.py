@@ -142,9 +142,12 @@ def test_no_number_depends_on_what_else_is_finished(outcomes: Outcomes, tmp_path
     few = folder_in(tmp_path)
     write_cells(few, select(["standard-walker2d-ppo-gaussian", "standard-walker2d-ppo-logit-normal"]))
     alone = Outcomes.read(few)
-    lone, among = (analysis.differences(o, PPO, "final") for o in (alone, outcomes))
-    assert lone["Walker2d"].difference == among["Walker2d"].difference
-    assert lone["Walker2d"].p_value == among["Walker2d"].p_value
+    for as_planned in (True, False):
+        lone, among = (
+            analysis.differences(o, PPO, "final", as_planned=as_planned) for o in (alone, outcomes)
+        )
+        assert lone["Walker2d"].difference == among["Walker2d"].difference
+        assert lone["Walker2d"].p_value == among["Walker2d"].p_value
     assert lone["Walker2d"].p_adjusted == pytest.approx(6 * lone["Walker2d"].p_value)
     assert [lone[robot].difference is None for robot in ROBOTS] == [r != "Walker2d" for r in ROBOTS]
     name = "standard-walker2d-ppo-gaussian"
