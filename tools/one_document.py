@@ -61,7 +61,7 @@ def join(book: Path, names: Sequence[str], numbers: Mapping[str, int]) -> str:
         if count > 1
     }
     for name, found in articles.items():
-        for_paper(found)
+        for_paper(found, (book / name).parent)
         relabel(found, name, shared, articles)
     head = union(soups, "link[rel=stylesheet], head style") + union(soups, "head script", "athJax")
     titles = {name: title(found) for name, found in articles.items()}
@@ -99,8 +99,13 @@ def heading_of(found: Tag, level: str = "h2") -> str:
     return " ".join(heading.get_text().replace("#", "").split()) if isinstance(heading, Tag) else ""
 
 
-def for_paper(found: Tag) -> None:
-    """Open what is folded, take out what only a screen can use, and show films as frames."""
+def for_paper(found: Tag, folder: Path) -> None:
+    """Open what is folded, take out what only a screen can use, and show films as frames.
+
+    Args:
+        found: what the page says.
+        folder: of the page, for the addresses of its films.
+    """
     for each in found.select(NOT_ON_PAPER):
         each.decompose()
     for each in found.find_all("details"):
@@ -114,19 +119,19 @@ def for_paper(found: Tag) -> None:
     for each in found.find_all("img", loading=True):
         del each["loading"]
     for film in found.find_all("video"):
-        film.replace_with(BeautifulSoup(frames(film), "html.parser"))
+        film.replace_with(BeautifulSoup(frames(film, folder), "html.parser"))
 
 
-def frames(film: Tag) -> str:
+def frames(film: Tag, folder: Path) -> str:
     """Return three frames of a film, from its beginning to its end, in a row."""
     said = html.escape(film.get("aria-label", "film"), quote=True)
     source = film.find("source") or film
-    address = str(source.get("src", ""))
-    if not address.startswith("data:video"):
+    file = folder / str(source.get("src", ""))
+    if not file.is_file():
         return f'<p class="no-film">{said}</p>'
     pictures = "".join(
         f'<img alt="{said}, frame {i} of {FRAMES}" src="data:image/jpeg;base64,{base64.b64encode(data).decode()}">'
-        for i, data in enumerate(stills(base64.b64decode(address.partition(",")[2]), FRAMES), 1)
+        for i, data in enumerate(stills(file.read_bytes(), FRAMES), 1)
     )
     return f'<div class="frames">{pictures}</div>'
 

@@ -76,7 +76,7 @@ def deck(book: Path, name: str, out: Path) -> int:
     """Write the deck of a chapter, and its figures; return the number of slides."""
     soup = BeautifulSoup((book / "notebooks" / f"{name}.html").read_text("utf8"), "html.parser")
     found = one_document.article(soup)
-    one_document.for_paper(found)
+    one_document.for_paper(found, book / "notebooks")
     for link in found.find_all("a"):
         link.unwrap()
     (out / "figures").mkdir(parents=True, exist_ok=True)
