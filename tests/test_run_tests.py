@@ -1,5 +1,6 @@
 """`make test` takes a skipped test for one that did not pass, but for the live robot's where npm cannot be reached."""
 
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -15,3 +16,9 @@ def test_what_may_be_skipped(reason: str, bad: int, tmp_path: Path, capfd: pytes
     path.write_text(f"import pytest\n\ndef test_a(): pass\n\ndef test_b(): pytest.skip({reason!r})\n")
     assert run_tests.run(["-p", "no:cacheprovider", str(path)], {"package and book"}) == bad
     assert ("1 tests of the live robot were left out" in capfd.readouterr().out) == (not bad)
+
+
+def test_the_files_that_take_longest_are_named() -> None:
+    times = [("tests.a", "1"), ("tests.b", "2"), ("tests.a", "2.5"), ("tests.c", "0.5")]
+    cases = [ElementTree.Element("testcase", {"classname": name, "time": time}) for name, time in times]
+    assert run_tests.longest(cases, 2) == [("tests.a", 3.5), ("tests.b", 2.0)]

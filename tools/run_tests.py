@@ -57,9 +57,18 @@ def run(arguments: list[str], expected: set[str]) -> int:
         print(f"npm cannot be reached: {without_npm} tests of the live robot were left out")
     for each in sorted(expected):
         print(f"{each}: {passed[each]} passed, {failed[each]} failed")
+    print(f"longest: {', '.join(f'{name} {seconds:.0f} s' for name, seconds in longest(cases))}")
     print(f"in {time.perf_counter() - start:.0f} s", flush=True)
     missing = sum(not passed[each] for each in expected)
     return sum(failed.values()) + missing + (status != 0)  # nothing collected, or pytest itself failed
+
+
+def longest(cases: list[ElementTree.Element], count: int = 5) -> list[tuple[str, float]]:
+    """Return the files whose tests took the most time together, all workers counted, the longest first."""
+    seconds: Counter[str] = Counter()
+    for case in cases:
+        seconds[case.get("classname", "")] += float(case.get("time", 0))
+    return seconds.most_common(count)
 
 
 def kind(case: ElementTree.Element) -> str:
