@@ -44,7 +44,7 @@ class Reading:
 
     @property
     def loose(self) -> str:
-        """Whether the mean is higher on most robots: most, not most, or open while cells are missing."""
+        """Whether the mean is higher on most robots: most, not most, or not yet known while cells are missing."""
         return self._most(self.higher)
 
     @property
@@ -55,7 +55,7 @@ class Reading:
     def _most(self, count: int) -> str:
         if count >= NEEDED:
             return "most"
-        return "open" if count + len(ROBOTS) - self.there >= NEEDED else "not most"
+        return "not yet known" if count + len(ROBOTS) - self.there >= NEEDED else "not most"
 
 
 def readings(outcomes: Outcomes, arm: str, endpoint: str = "final") -> list[Reading]:
