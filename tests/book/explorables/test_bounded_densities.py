@@ -30,6 +30,7 @@ RNG = np.random.default_rng(7)
 # Corners of the sliders, both sides of the bimodality condition, and points in between.
 LATENTS = [
     *[(mu, log_sigma) for mu in (-4.0, 0.0, 4.0) for log_sigma in (-3.0, 0.3, 0.4, 1.0)],
+    (1.0, 1.0),  # a peak so near a bound that three digits would put it there
     *zip(RNG.uniform(-4, 4, 20).tolist(), RNG.uniform(-3, 1, 20).tolist(), strict=True),
 ]
 
@@ -194,6 +195,9 @@ def test_table_and_note_say_what_the_laws_say(states: list[dict[str, Any]]) -> N
         assert {len(cells) for cells in state["table"].values()} == {len(explorable.columns)}
         assert ("two peaks" in state["note"]) == (len(state["laws"]["logit-normal"]["modes"]) == 2)
         assert float(state["table"]["std"][0]) == pytest.approx(law["std"], abs=6e-4)
+        assert not re.search(
+            r"\b1\.0+\b", state["note"] + state["table"]["modes"][2]
+        )  # a peak is never at a bound
 
 
 class Page(HTMLParser):

@@ -64,6 +64,9 @@ def test_slopes_of_the_candidates_are_theirs(states: list[dict]) -> None:
         (0.5, 1.0, "leads back"),
         (1.5, -1.0, "leads back"),
         (1.5, 0.0, "asks for nothing"),
+        (1.2, 1.0, "stands at the end of the interval, in the direction that was wanted"),
+        (0.8, 1.0, "stands at the end of the interval, in the wrong direction"),
+        (1.25, 1.0, "has left the interval in the direction"),
     ],
 )
 def test_the_note_names_the_case(ratio: float, advantage: float, words: str) -> None:

@@ -93,6 +93,15 @@ def test_note_says_when_the_sign_is_wrong() -> None:
         assert ("wrong way" in state["note"]) == opposite
 
 
+def test_note_finds_no_sign_in_what_is_zero_but_for_rounding() -> None:
+    point = "{ mu: 2.4, log_sigma: -1.7, peak: 1, share: 1 }"
+    state = run_js(f'inbounds.models["score-estimators"]({point})')
+    found = [state["here"]["loc"][name]["mean"] for name in ("clipped", "capg")]
+    assert found[0] * found[1] < 0
+    assert state["table"]["mean_loc"][1:] == ["0.000", "0.000"]
+    assert "wrong way" not in state["note"]
+
+
 def test_table_html_and_fallback() -> None:
     explorable = score_estimators(mu=0.4, sigma=0.5, share=0.5)
     html = explorable.html(live=False)

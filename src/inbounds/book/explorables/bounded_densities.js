@@ -34,13 +34,18 @@ inbounds.models["bounded-densities"] = ({ mu, log_sigma }) => {
   const highest = Math.max(...Object.values(curves).flatMap((curve) => curve.y));
 
   const number = (v, digits = 2) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const inside = (a) => { // with so many digits that it is not written as a bound
+    let digits = 3;
+    while (Math.abs(a) < 1 && Math.abs(Number(a.toFixed(digits))) === 1) digits++;
+    return number(a, digits);
+  };
   const percent = (p) => (p === 0 ? "0" : p < 0.0005 ? "< 0.1 %" : `${number(100 * p, 1)} %`);
   const shape = (v) => (v < 100 ? number(v) : number(v, 0));
   const named = (values) => Object.entries(values).map(([name, v]) => `${name}\u00a0${v}`).join(", ");
   const cells = (read) => laws.map((law) => (law === beta && !beta.proper ? "–" : read(law)));
   const masses = [gaussian.atLow, gaussian.atHigh];
   const atBound = masses[0] + masses[1];
-  const peaks = squashed.modes.map((a) => number(a, 3));
+  const peaks = squashed.modes.map(inside);
 
   return {
     sources: {
@@ -64,7 +69,7 @@ inbounds.models["bounded-densities"] = ({ mu, log_sigma }) => {
       mean: cells((law) => number(law.mean, 3)),
       std: cells((law) => number(law.std, 3)),
       median: cells((law) => number(law.median, 3)),
-      modes: cells((law) => law.modes.map((a) => number(a, 3)).join(" and ")),
+      modes: cells((law) => law.modes.map(inside).join(" and ")),
     },
     note:
       `The Gaussian executes ${atBound === 0 ? "none" : percent(atBound)} of its actions exactly at a bound. ` +

@@ -33,6 +33,8 @@ inbounds.models["ppo-clip"] = ({ ratio, advantage, clip_range }) => {
   const number = (v) => v.toFixed(2).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
   const cells = (read) => names.map((name) => number(read(name)));
   const side = inside(ratio) ? 0 : Math.sign(ratio - 1); // −1: below 1 − ε, 0: inside, 1: above 1 + ε
+  const atEdge = side !== 0 && Math.abs(Math.abs(ratio - 1) - clip_range) < 1e-9;
+  const place = atEdge ? "stands at the end of the interval," : "has left the interval";
   const kind = advantage > 0 ? "better" : "worse";
   const wanted = Math.sign(advantage) * side;
   const note =
@@ -41,8 +43,8 @@ inbounds.models["ppo-clip"] = ({ ratio, advantage, clip_range }) => {
       : `The action was ${kind} than expected. ` +
         {
           0: `Its ratio is inside the interval: the surrogate pushes it ${advantage > 0 ? "up" : "down"}.`,
-          1: "Its ratio has left the interval in the direction that was wanted: flat, nothing pushes further, and nothing pulls back.",
-          "-1": "Its ratio has left the interval in the wrong direction: the clip is ignored, and the full slope leads back.",
+          1: `Its ratio ${place} in the direction that was wanted: flat, nothing pushes further, and nothing pulls back.`,
+          "-1": `Its ratio ${place} in the wrong direction: the clip is ignored, and the full slope leads back.`,
         }[wanted];
   return {
     sources,

@@ -87,9 +87,11 @@ inbounds.models["score-estimators"] = ({ mu, log_sigma, peak, share }) => {
 
   const number = (v) => v.toFixed(3).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
   const cells = (read) => names.map((name) => number(read(name)));
-  const wrong = here.loc.clipped.mean - here.loc.capg.mean;
-  const opposite = here.loc.clipped.mean * here.loc.capg.mean < 0;
-  const saved = 1 - (here.loc.capg.std / here.loc.drawn.std) ** 2;
+  const { clipped, capg } = here.loc;
+  const seen = Math.min(Math.abs(clipped.mean), Math.abs(capg.mean)) >= 0.0005; // not what is zero but for rounding
+  const wrong = clipped.mean - capg.mean;
+  const opposite = seen && clipped.mean * capg.mean < 0;
+  const saved = 1 - (capg.std / here.loc.drawn.std) ** 2;
   const percent = (p) => (p > 0 && p < 0.0005 ? "less than 0.1 %" : `${(100 * p).toFixed(1)} %`);
   return {
     sources,
