@@ -25,7 +25,7 @@ CARRIED = re.compile(
 )
 TAG = re.compile(r"<(?P<name>img|source)\b(?P<said>[^>]*?)(?P<end>\s*/?>)")
 ADDRESS = re.compile(r'\bsrc(?:set)?="(?P<address>[^":]+\.(?:png|jpg|svg))"')
-WIDTH = re.compile(r'\swidth="(?P<pixels>\d+)"')
+WIDTH = re.compile(r'\swidth="(?P<pixels>\d+)(px)?"')
 VIEW = re.compile(r"""viewBox=["'][\d.-]+ [\d.-]+ (?P<width>[\d.]+) (?P<height>[\d.]+)["']""")
 
 

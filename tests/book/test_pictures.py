@@ -88,6 +88,10 @@ def test_a_drawing_in_its_address_becomes_a_file(pictures: ModuleType, html: Pat
     [
         ('<img src="../_images/figure.png" alt="A curve" style="width: 15px;" />', ("30", "20")),
         ('<img src="../_images/figure.png" alt="A curve" width="15">', ("15", "10")),
+        (
+            '<img src="../_images/figure.png" alt="A curve" width="15px" />',
+            ("15px", "10"),
+        ),  # Sphinx, of an SVG
         ('<img src="../_images/figure.png" alt="A curve" width="15" height="12">', ("15", "12")),
         ('<img src="../_images/missing.png" alt="A curve">', (None, None)),
         ('<img src="https://example.org/a.png" alt="A curve">', (None, None)),

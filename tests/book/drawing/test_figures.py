@@ -6,6 +6,7 @@ import itertools
 import json
 from collections.abc import Callable
 from typing import Any
+from xml.etree import ElementTree
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -109,14 +110,28 @@ def test_show_hands_over_image_and_alt_text(monkeypatch: pytest.MonkeyPatch) -> 
     assert image.getpixel((0, 0)) == (255, 255, 255, 255)
 
 
+def test_in_the_book_a_figure_is_a_drawing_unless_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("INBOUNDS_BOOK_BUILD", "1")
+    data, metadata = shown(monkeypatch, "A line that falls from one to zero.")
+    assert metadata == {"image/svg+xml": {"alt": "A line that falls from one to zero.", "width": 300}}
+    drawing = ElementTree.fromstring(data["image/svg+xml"])
+    assert drawing.get("viewBox") == "0 0 216 144"  # points, 72 an inch
+    monkeypatch.setattr(alt_text, "LONGEST_DRAWING", len(data["image/svg+xml"]) - 1)
+    data, metadata = shown(monkeypatch, "A line that falls from one to zero.")
+    assert set(data) == {"image/png", "text/plain"}
+    assert set(metadata) == {"image/png"}
+
+
 @pytest.mark.parametrize("alt", ["", "  ", "a plot", "plot.png"])
 def test_show_wants_a_sentence(alt: str) -> None:
     with pytest.raises(ValueError, match="say in a sentence"):
         figures.show(Figure(), alt)
 
 
-def test_alt_text_reaches_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+@pytest.mark.parametrize("building", ["0", "1"])
+def test_alt_text_reaches_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Any, building: str) -> None:
     """MyST-NB's own renderer, with the plugin, writes the alt text and leaves other outputs alone."""
+    monkeypatch.setenv("INBOUNDS_BOOK_BUILD", building)
     from docutils.core import publish_string
     from myst_nb.core import render
     from myst_nb.docutils_ import Parser
@@ -140,6 +155,8 @@ def test_alt_text_reaches_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: An
         },
     )
     assert 'alt="A &quot;line&quot; that falls &amp; rises."' in html
+    (file,) = tmp_path.glob("*.svg" if building == "1" else "*.png")
+    assert file.name in html
     assert "a plain output" in html
 
 

@@ -14,11 +14,16 @@ import urllib.parse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from inbounds.book.building import builds_the_book
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PIXELS_PER_INCH = 100
 """CSS pixels that one inch of a figure takes up on the page; the image itself is twice as fine."""
+
+LONGEST_DRAWING = 200_000
+"""Characters of SVG up to which a figure is a drawing on a page of the book; one of very many points is a picture."""
 
 
 def png_bytes(fig: Figure, *, pixel_ratio: float = 2.0) -> bytes:
@@ -38,20 +43,24 @@ def svg_bytes(fig: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def svg_uri(fig: Figure) -> str:
-    """Return a figure as the address of an SVG: with places to a hundredth of a point, which no eye can tell apart.
-
-    Written out, not in base64: that is a quarter less, and a server's compression makes less than half of it.
-    """
+def short_svg(fig: Figure) -> str:
+    """Return a figure as SVG with places to a hundredth of a point, which no eye can tell apart."""
     svg = svg_bytes(fig).decode("utf-8")
     svg = re.sub(r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     places = re.compile(r'\b(?:d|x|y)="[^"]*"|translate\([^)]*\)')
     svg = places.sub(lambda where: re.sub(r"-?\d+\.\d{3,}", _in_hundredths, where[0]), svg)
     svg = re.sub(r"\s+", " ", svg)
     svg = re.sub(r'\bd="[^"]*"', lambda path: re.sub(r" ?([A-Zz]) ?", r"\1", path[0]), svg).replace('"', "'")
-    address = urllib.parse.quote(svg.strip(), safe=_SAFE).replace(
-        "://", ":%2F%2F"
-    )  # no page seems to ask elsewhere
+    return svg.strip()
+
+
+def svg_uri(fig: Figure) -> str:
+    """Return a figure as the address of an SVG.
+
+    Written out, not in base64: that is a quarter less, and a server's compression makes less than half of it.
+    """
+    address = urllib.parse.quote(short_svg(fig), safe=_SAFE)
+    address = address.replace("://", ":%2F%2F")  # no page seems to ask elsewhere
     return f"data:image/svg+xml,{address}"
 
 
@@ -97,7 +106,7 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
 
 
 def show(fig: Figure, alt: str) -> None:
-    """Put a figure on the page with its alt text, and close it.
+    """Put a figure on the page with its alt text, and close it: in the book a drawing, which stays sharp at any size.
 
     The stored notebook keeps the alt text as the output's plain text, so a reader without pictures, and the
     test that compares outputs, see what the figure claims.
@@ -119,10 +128,14 @@ def show(fig: Figure, alt: str) -> None:
     from IPython.display import display
 
     alt = " ".join(alt.split())
-    png, width = last_picture(fig, alt)
+    drawing = short_svg(fig) if builds_the_book() else ""
+    picture, width = last_picture(fig, alt)
+    kind = "image/png"
+    if 0 < len(drawing) <= LONGEST_DRAWING:
+        kind, picture = "image/svg+xml", drawing
     display(
-        {"image/png": png, "text/plain": f"Figure: {alt}"},
-        metadata={"image/png": {"alt": alt, "width": width}},
+        {kind: picture, "text/plain": f"Figure: {alt}"},
+        metadata={kind: {"alt": alt, "width": width}},
         raw=True,
     )
 

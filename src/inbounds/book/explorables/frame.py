@@ -18,7 +18,6 @@ from __future__ import annotations
 import functools
 import html
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,6 +40,7 @@ from bokeh.models import (
 from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
+from inbounds.book.building import builds_the_book
 from inbounds.book.drawing import figures
 from inbounds.book.drawing.variables import color_variables
 from inbounds.book.explorables.legend import Mark
@@ -135,7 +135,7 @@ class Explorable:
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
         """HTML for browsers, one line of text for everything else."""
-        live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+        live = not builds_the_book()
         return {"text/html": self.html(live=live), "text/plain": repr(self)}
 
     @functools.cached_property

@@ -8,13 +8,13 @@ are there.
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from inbounds.book.building import builds_the_book
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
@@ -48,7 +48,7 @@ def claims(found: Sequence[Finding]) -> Shown:
         for subject, together in groupby(found, key=lambda each: each.claim.subject)
     }
     counts = Counter(map(verdict, found))
-    live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+    live = not builds_the_book()
     element = macros("claims").element(
         subjects,
         {word: counts[word] for word in MARKS if counts[word]} if len(found) > FEW else {},

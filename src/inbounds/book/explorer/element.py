@@ -6,7 +6,6 @@ import base64
 import dataclasses
 import functools
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from inbounds.book.building import builds_the_book
 from inbounds.book.drawing.alt_text import svg_bytes
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.drawing.variables import color_variables
@@ -66,7 +66,7 @@ class StudyExplorer:
     def _repr_html_(self) -> str:
         looks = {family: {"dash": DASHES[look.linestyle]} for family, look in LOOKS.items()}
         text = json.dumps(self.data | {"looks": looks}, ensure_ascii=False, separators=(",", ":"))
-        live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+        live = not builds_the_book()
         return str(
             macros("explorer").explorer(
                 self.data,

@@ -13,7 +13,6 @@ import base64
 import functools
 import itertools
 import json
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from inbounds.book.building import builds_the_book
 from inbounds.book.drawing import figures
 from inbounds.book.drawing.alt_text import svg_bytes
 from inbounds.book.explorer.choices import verdict
@@ -139,7 +139,7 @@ class PickedSeeds:
     def _repr_html_(self) -> str:
         if not self.data["rows"]:
             return self.static
-        live = os.environ.get("INBOUNDS_BOOK_BUILD") != "1"
+        live = not builds_the_book()
         text = json.dumps(self.data, ensure_ascii=False, separators=(",", ":"))
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS) if live else ""
         return str(
