@@ -10,6 +10,7 @@ import base64
 import hashlib
 import re
 import urllib.parse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,8 @@ CARRIED = re.compile(
 TAG = re.compile(r"<(?P<name>img|source)\b(?P<said>[^>]*?)(?P<end>\s*/?>)")
 ADDRESS = re.compile(r'\bsrc(?:set)?="(?P<address>[^":]+\.(?:png|jpg|svg))"')
 WIDTH = re.compile(r'\swidth="(?P<pixels>\d+)(px)?"')
-VIEW = re.compile(r"""viewBox=["'][\d.-]+ [\d.-]+ (?P<width>[\d.]+) (?P<height>[\d.]+)["']""")
+SIZES = re.compile(r"""\s(?P<side>width|height)=["'](?P<length>[\d.]+)(?P<unit>pt|px)?["']""")
+PIXELS = {"pt": 4 / 3, "px": 1.0, None: 1.0}  # in a unit of length
 
 
 def bring_when_near(
@@ -36,7 +38,11 @@ def bring_when_near(
     if app.builder.format == "html" and context.get("body"):
         html = Path(app.outdir)
         body = write_files(context["body"], html / FOLDER, context["pathto"](FOLDER, 1))
-        body = make_room(body, (html / pagename).parent)
+        # Sphinx copies a page's figures when all pages are written.
+        later = {
+            html / FOLDER / name: Path(app.srcdir, source) for source, name in app.builder.images.items()
+        }
+        body = make_room(body, (html / pagename).parent, later)
         context["body"] = body.replace(' preload="metadata"', ' preload="none"')
 
 
@@ -60,12 +66,13 @@ def write_files(body: str, folder: Path, address: str) -> str:
     return CARRIED.sub(file, body)
 
 
-def make_room(body: str, folder: Path) -> str:
+def make_room(body: str, folder: Path, later: Mapping[Path, Path]) -> str:
     """Return a page whose pictures come when they are near, into room of their size.
 
     Args:
         body: HTML of the page.
         folder: that of the page, for the addresses of its pictures.
+        later: for pictures that are still to come, where they are now.
     """
 
     def tag(found: re.Match[str]) -> str:
@@ -73,9 +80,9 @@ def make_room(body: str, folder: Path) -> str:
         if name == "img" and " loading=" not in said:
             said += ' loading="lazy"'
         source = ADDRESS.search(said)
-        file = (
-            (folder / source["address"]).resolve() if source else None
-        )  # no page is written yet, nor its folder
+        # Not every folder is there yet: what leads up and down again is worked out on paper.
+        file = (folder / source["address"]).resolve() if source else None
+        file = later.get(file, file) if file else None
         if file is not None and file.is_file() and " height=" not in said:
             width, height = size(file)
             given = WIDTH.search(said)
@@ -87,16 +94,17 @@ def make_room(body: str, folder: Path) -> str:
 
 
 def size(file: Path) -> tuple[float, float]:
-    """Return width and height of a picture.
+    """Return width and height of a picture, in pixels.
 
     Raises:
-        ValueError: an SVG without a viewBox.
+        ValueError: an SVG that does not say them.
     """
     if file.suffix == ".svg":
-        view = VIEW.search(file.read_text(encoding="utf8"))
-        if view is None:
-            raise ValueError(f"{file}: an SVG needs a viewBox, which says its size")
-        return float(view["width"]), float(view["height"])
+        head = file.read_text(encoding="utf8").partition("<svg")[2].partition(">")[0]
+        sides = {each["side"]: float(each["length"]) * PIXELS[each["unit"]] for each in SIZES.finditer(head)}
+        if len(sides) < 2:
+            raise ValueError(f"{file}: an SVG needs width and height, in pt or px, for its room on a page")
+        return sides["width"], sides["height"]
     with Image.open(file) as picture:
         return picture.size
 
