@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 NB ?= $(wildcard notebooks/*.ipynb)
 PORT ?= 8000
 
-.PHONY: help setup book quick test check format notebooks pages pdf slides serve lab bench dist clean distclean
+.PHONY: help setup book quick test check format notebooks pages lighthouse pdf slides serve lab bench dist clean distclean
 
 help:  ## list these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -21,7 +21,7 @@ setup:  ## create .venv and install the pinned packages (the other targets do th
 book: setup  ## execute the notebooks, build the HTML book, print its path  (FORCE=1: from nothing)
 	@$(PY) tools/build_book.py $(if $(FORCE),--force)
 
-quick: setup  ## format, lint, types and the fast tests  (two minutes; while you work)
+quick: setup  ## format, lint, types and the fast tests  (a few minutes; while you work)
 	@$(PY) tools/run_checks.py format lint types && $(PY) tools/run_tests.py --quick
 
 test: setup  ## pytest on the package and the book, nbval on the notebooks
@@ -39,6 +39,10 @@ notebooks: setup  ## execute notebooks and store their text outputs  (NB=noteboo
 pages: book  ## open every built page in headless Chromium, six in Firefox, and check them
 	@tools/setup.sh --with-browsers
 	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
+
+lighthouse: book  ## how fast six pages come to a phone, by Lighthouse  (about five minutes, quiet machine)
+	@tools/setup.sh --with-chromium
+	@$(PY) tools/lighthouse.py
 
 pdf: book  ## print the whole book into one PDF, _build/pdf/in-bounds.pdf
 	@tools/setup.sh --with-chromium
