@@ -192,7 +192,7 @@ def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
     names = [SHORT[family] for family in row.contrast[2:]]
     with figures.use_style():
         fig, ax = plt.subplots(figsize=(figures.WIDTH, 2.8))
-        ax.hist(every.value.ravel(), bins=41, color="#5F6770")
+        ax.hist(every.value.ravel(), bins=41, histtype="stepfilled", color="#5F6770")
         ax.axvline(0, color="#22272D", linewidth=1)
         ax.axvline(float(row.difference.value), color="#A8330A", label="all ten seeds")
         ax.set(xlabel=f"{names[0]} − {names[1]}, difference of means [points]", ylabel="reports")
