@@ -81,6 +81,14 @@
       if (wanted && seen) for (const film of films) { film.muted = true; film.play().catch(() => {}); }
     };
     const stop = () => films.forEach((film) => film.pause());
+    /* A film that arrived later, or was decoded more slowly, catches up with the first one by its speed. */
+    const [first, ...others] = films;
+    first.addEventListener("timeupdate", () => {
+      for (const film of others) {
+        const behind = first.currentTime - film.currentTime;
+        film.playbackRate = 1 + Math.max(-0.5, Math.min(0.5, 2 * behind));
+      }
+    });
     for (const film of films) {
       film.addEventListener("play", () => { film.dataset.plays = ""; });
       film.addEventListener("pause", () => { if (!film.ended) delete film.dataset.plays; });
