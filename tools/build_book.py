@@ -4,9 +4,8 @@
     python tools/build_book.py --force    from nothing
     python tools/build_book.py --zip      put the built book into dist/in-bounds-VERSION.zip
 
-Jupyter Book caches executed notebooks by their cells alone. A chapter also depends on the package, the data and the
-pinned versions, so the cache lives in a folder named by a digest of those: change one and every notebook runs again.
-Jupyter Book executes one notebook after another. So what the cache lacks is executed beforehand, several at a time.
+Jupyter Book executes one notebook after another. So what its cache lacks is executed beforehand, several at a time
+(`notebook_cache.py`).
 
 Formulas are set once the pages stand, and the live robot is added. Both need packages from npm. Where npm cannot be
 reached MathJax sets the formulas in the reader's browser, and the book has films in the robot's place; the next run
@@ -14,40 +13,24 @@ tries again.
 """
 
 import argparse
-import hashlib
 import os
 import shutil
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-BUILD = ROOT / "_build"
+import notebook_cache
+from notebook_cache import BUILD, CODE, ROOT, digest
+
 INDEX = BUILD / "html" / "index.html"
 STAMP = BUILD / "built-from"
 LIVE = BUILD / "live"  # what the live robot loads, copied into the book
-AT_ONCE = min(4, os.cpu_count() or 1)  # notebooks; each takes one core and up to 1 GB
-CODE = (
-    "src",
-    "results",
-    "benchmarks/contestants.py",
-    "benchmarks/equivalence.py",
-    "benchmarks/report.py",
-    "benchmarks/validate.py",
-    "benchmarks/results/engines/ppo-logit-normal/engines.json",
-    "benchmarks/results/live.json",
-    "benchmarks/results/speed.json",
-    "benchmarks/results/validation/curves.parquet",
-    "benchmarks/results/validation/validation.json",
-    "constraints.txt",
-    "pyproject.toml",
-)
 PAGES = (
     "book",
     "notebooks",
     "tools/build_book.py",
+    "tools/notebook_cache.py",
     "tools/student_copies.py",
     "CITATION.cff",
     "_config.yml",
@@ -55,59 +38,11 @@ PAGES = (
 )
 
 
-def digest(*names: str) -> str:
-    """Return a digest of the contents of files and folders below ROOT, without what Python and Jupyter leave behind."""
-    total = hashlib.sha256(sys.version.encode())
-    for name in names:
-        base = ROOT / name
-        for path in sorted(base.rglob("*")) if base.is_dir() else [base]:
-            if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts):
-                total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
-    return total.hexdigest()[:16]
-
-
-def execute_one(cache: str, key: int, timeout: int) -> None:
-    """Execute a notebook of the cache's project, unless the cache has it already; called in a process of its own."""
-    from jupyter_cache import get_cache
-    from jupyter_cache.executors import load_executor
-
-    load_executor("local-serial", get_cache(cache)).run_and_cache(filter_pks=[key], timeout=timeout)
-
-
-def execute(cache: Path) -> None:
-    """Execute what the cache lacks. What fails is not cached: Jupyter Book runs it again, and says what is wrong."""
-    import yaml  # not above, like the cache: mostly nothing changed, and then neither is needed
-    from jupyter_cache import get_cache
-
-    timeout = yaml.safe_load((ROOT / "_config.yml").read_text())["execute"]["timeout"]  # of a cell, seconds
-    project, start = get_cache(cache), time.perf_counter()
-    keys = {
-        path.name: project.add_nb_to_project(str(path)).pk for path in (ROOT / "notebooks").glob("*.ipynb")
-    }
-    with ProcessPoolExecutor(AT_ONCE) as pool:
-        running = {
-            pool.submit(execute_one, str(cache), key, timeout): name for name, key in sorted(keys.items())
-        }
-        for count, done in enumerate(as_completed(running), 1):
-            done.result()
-            print(
-                f"{count:3d} of {len(keys)}  {running[done]}  ({time.perf_counter() - start:.0f} s)",
-                flush=True,
-            )
-
-
 def build(code: str) -> int:
     """Execute the notebooks and run Jupyter Book, both told that the output is a static page."""
-    cache = BUILD / ".jupyter_cache" / code
-    for stale in cache.parent.glob("*"):
-        if stale != cache:
-            # Pages keep their outputs in pickled doctrees, which know nothing of the package either.
-            shutil.rmtree(stale)
-            shutil.rmtree(BUILD / ".doctrees", ignore_errors=True)
-    cache.mkdir(parents=True, exist_ok=True)
     STAMP.unlink(missing_ok=True)
+    cache = notebook_cache.fill(code)
     os.environ |= {"INBOUNDS_BOOK_BUILD": "1", "INBOUNDS_NB_CACHE": str(cache)}
-    execute(cache)
     command = [
         str(Path(sys.executable).with_name("jupyter-book")),
         "build",

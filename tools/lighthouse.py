@@ -10,8 +10,6 @@ the browser (default: Chromium or Chrome on PATH). npm brings Lighthouse, once.
 
 import argparse
 import json
-import os
-import shutil
 import statistics
 import subprocess
 import sys
@@ -23,7 +21,6 @@ from inbounds.book.npm import CACHE, NpmError, made_once, node
 ROOT = Path(__file__).resolve().parents[1]
 HTML = ROOT / "_build" / "html"
 HERE = Path(__file__).with_suffix("")
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 BAR = 70  # of a hundred
 SHIFT = 0.05  # of the screen, added up
 PAGES = (
@@ -78,13 +75,11 @@ def main() -> int:
     if missing := [page for page in args.pages if not (args.html / page).is_file()]:
         print(f"no page {missing[0]} in {args.html}: run `make book` first", file=sys.stderr)
         return 1
-    chosen = os.environ.get("INBOUNDS_CHROMIUM")
-    browser = next(filter(None, map(shutil.which, [chosen] if chosen else BROWSERS)), None)
-    if browser is None:
-        print("no Chromium on PATH: apt install chromium, or set INBOUNDS_CHROMIUM", file=sys.stderr)
-        return 1
+    sys.path.insert(0, str(ROOT))
+    from tests.pages.browser import find_chromium  # the browser of the page tests
+
     try:
-        found = measure(browser, args.html.resolve(), args.runs, list(args.pages))
+        found = measure(find_chromium(), args.html.resolve(), args.runs, list(args.pages))
     except (NpmError, RuntimeError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -5,7 +5,10 @@
     python tools/run_tests.py NOTEBOOK ...      nbval on these notebooks only
     python tools/run_tests.py --cell-timeout 30 NOTEBOOK ...    and no cell may take longer than that [s]
 
-All of it is one session, so that no worker is without work as long as another has a file to spare. A test that was
+A notebook that the book has executed (`make book`), or will, is executed once: nbval compares what the book's cache
+has of it (`notebook_cache.py`). NOTEBOOKs that are named are executed here and now.
+
+The rest is one session, so that no worker is without work as long as another has a file to spare. A test that was
 skipped or expected to fail did not pass: nbval marks the cells after a dead kernel as expected failures, and would
 otherwise end in green. Only the live robot's tests may be left out, where npm cannot be reached: the book is built
 without it there, too.
@@ -21,7 +24,9 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+import notebook_cache
+
+ROOT = notebook_cache.ROOT
 WORKERS = max(2, min(4, os.cpu_count() or 1))  # each takes one core and up to 1.5 GB
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 MAY_SKIP = "the live robot is not tested here"
@@ -99,7 +104,8 @@ def main() -> int:
     else:
         notebooks = [str(path) for path in sorted((ROOT / "notebooks").glob("*.ipynb"))]
         notebooks.append("tools/chapter_template.ipynb")
-        everything = ["-m", "not pages", *nbval, *PARALLEL, *notebooks, "tests"]
+        executed = notebook_cache.fill(notebook_cache.digest(*notebook_cache.CODE))
+        everything = ["-m", "not pages", *nbval, f"--executed={executed}", *PARALLEL, *notebooks, "tests"]
         bad = run(everything, {"notebooks", "package and book"})
     return 1 if bad else 0
 

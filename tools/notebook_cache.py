@@ -1,0 +1,87 @@
+"""Notebooks executed once: the book shows what they put out (`make book`), nbval compares it (`make test`).
+
+Jupyter's cache knows an executed notebook by its cells alone. A chapter also depends on the package, the data and the
+pinned versions, so a cache lives in a folder named by a digest of those: change one and every notebook runs again.
+"""
+
+import hashlib
+import os
+import shutil
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "_build"
+AT_ONCE = min(4, os.cpu_count() or 1)  # notebooks; each takes one core and up to 1 GB
+CODE = (
+    "src",
+    "results",
+    "benchmarks/contestants.py",
+    "benchmarks/equivalence.py",
+    "benchmarks/report.py",
+    "benchmarks/validate.py",
+    "benchmarks/results/engines/ppo-logit-normal/engines.json",
+    "benchmarks/results/live.json",
+    "benchmarks/results/speed.json",
+    "benchmarks/results/validation/curves.parquet",
+    "benchmarks/results/validation/validation.json",
+    "constraints.txt",
+    "pyproject.toml",
+)
+"""What a notebook's output depends on, besides its cells."""
+
+
+def digest(*names: str) -> str:
+    """Return a digest of the contents of files and folders below ROOT, without what Python and Jupyter leave behind."""
+    total = hashlib.sha256(sys.version.encode())
+    for name in names:
+        base = ROOT / name
+        for path in sorted(base.rglob("*")) if base.is_dir() else [base]:
+            if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts):
+                total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def fill(code: str) -> Path:
+    """Execute what the cache of this digest lacks, as for the book's pages, and return its folder.
+
+    What fails is not cached: who needs it runs it again, and says what is wrong.
+    """
+    import yaml  # not above, like the cache: mostly nothing changed, and then neither is needed
+    from jupyter_cache import get_cache
+
+    cache = BUILD / ".jupyter_cache" / code
+    for stale in cache.parent.glob("*"):
+        if stale != cache:
+            # Pages keep their outputs in pickled doctrees, which know nothing of the package either.
+            shutil.rmtree(stale)
+            shutil.rmtree(BUILD / ".doctrees", ignore_errors=True)
+    cache.mkdir(parents=True, exist_ok=True)
+    timeout = yaml.safe_load((ROOT / "_config.yml").read_text())["execute"]["timeout"]  # of a cell, seconds
+    project, start = get_cache(cache), time.perf_counter()
+    keys = {
+        path.name: project.add_nb_to_project(str(path)).pk for path in (ROOT / "notebooks").glob("*.ipynb")
+    }
+    with ProcessPoolExecutor(
+        AT_ONCE, initializer=os.environ.update, initargs=({"INBOUNDS_BOOK_BUILD": "1"},)
+    ) as pool:
+        running = {
+            pool.submit(_execute, str(cache), key, timeout): name for name, key in sorted(keys.items())
+        }
+        for count, done in enumerate(as_completed(running), 1):
+            done.result()
+            print(
+                f"{count:3d} of {len(keys)}  {running[done]}  ({time.perf_counter() - start:.0f} s)",
+                flush=True,
+            )
+    return cache
+
+
+def _execute(cache: str, key: int, timeout: int) -> None:
+    """Execute a notebook of the cache's project, unless the cache has it already; called in a process of its own."""
+    from jupyter_cache import get_cache
+    from jupyter_cache.executors import load_executor
+
+    load_executor("local-serial", get_cache(cache)).run_and_cache(filter_pks=[key], timeout=timeout)
