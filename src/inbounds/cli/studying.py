@@ -32,8 +32,9 @@ Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...
 @dataclass(frozen=True)
 class _Where:
     cells: Cells = ()
-    """Which: arms (standard, printed, beyond, mechanisms; afterwards, outside the protocol), ids, or patterns like
-    '*-hopper-ppo-*'; by default all of the protocol (status and verify: all)."""
+    """Which: arms (standard, printed, beyond, mechanisms; the second study's equal, equal-more, as-they-come, noise,
+    steps; afterwards, of neither protocol), ids, or patterns like '*-hopper-ppo-*'; by default all of the first
+    protocol (status, evaluate and verify: all)."""
     results: Path = StudyFolder.results
     """Folder of the results."""
     work: Path = StudyFolder.work
@@ -234,9 +235,10 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         raise StudyError(
             f"the report needs Matplotlib and Jinja2 ({error}): pip install '.[report]' in the source tree"
         ) from error
-    outcomes = Outcomes.read(command.folder(), cells)
     try:
-        path = write_report(outcomes, command.out)
+        with console.status("reading the cells") as now:
+            outcomes = Outcomes.read(command.folder(), cells)
+            path = write_report(outcomes, command.out, lambda section: now.update(f"writing: {section}"))
     except OSError as error:
         raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
     console.print(f"{len(outcomes.finished)} of {len(cells)} cells are finished", markup=False)

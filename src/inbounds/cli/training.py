@@ -20,7 +20,7 @@ from inbounds.cli.options import Train, quoted
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
 from inbounds.headless import BackendError
-from inbounds.learning import TrainConfig, Trainer, train
+from inbounds.learning import FAMILIES, TrainConfig, Trainer, train
 from inbounds.learning.rollout import check_environments
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import (
@@ -33,6 +33,7 @@ from inbounds.learning.storage.run_store import (
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields
 from inbounds.learning.storage.whole_files import DamagedFileError, held, is_disk_full
 from inbounds.learning.training import Record, make_environments, prepare
+from inbounds.learning.updates.engine import compiled_engine
 from inbounds.robots.registration import TASK_NAMES
 
 
@@ -101,8 +102,9 @@ class _Session:
                 board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
             if config.engine == "compiled":
-                progress.say("compiling the update for this processor; the next run finds it on disk")
                 try:
+                    compiled_engine(FAMILIES[config.policy.family])  # before anything is promised
+                    progress.say("compiling the update for this processor; the next run finds it on disk")
                     progress.say(f"compiled, or found on disk, in {prepare(config):.1f} s")
                 except ValueError as error:
                     if not is_ours(error):

@@ -77,9 +77,12 @@ class Page(HTMLParser):
 
 def report(folder: StudyFolder, path: Path) -> Page:
     before = dict(mpl.rcParams)
-    write_report(Outcomes.read(folder), path / "report.html")
+    sections: list[str] = []
+    write_report(Outcomes.read(folder), path / "report.html", sections.append)
     assert dict(mpl.rcParams) == before
     page = Page((path / "report.html").read_text(encoding="utf8"))
+    assert [heading for heading in page.headings if heading in sections] == sections
+    assert len(sections) == 9
     assert all(address.startswith(("data:image/png;base64,", "#")) for address in page.addresses)
     assert all(len(alt.split()) > 8 for alt in page.images)
     for rows in page.tables.values():

@@ -8,7 +8,7 @@ It works with no cell, with a few and with all of them: what is missing is calle
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from inbounds.book.report import arms, html
@@ -38,12 +38,13 @@ HOW_TO_READ = (
 )
 
 
-def write_report(outcomes: Outcomes, path: Path) -> Path:
+def write_report(outcomes: Outcomes, path: Path, on_section: Callable[[str], object] = str) -> Path:
     """Write the report as one HTML file that needs no other.
 
     Args:
         outcomes: of the study.
         path: of the file; its folder is made if missing.
+        on_section: called with the title of each section, before its figures are drawn; a minute in all.
 
     Returns:
         The path.
@@ -57,11 +58,11 @@ def write_report(outcomes: Outcomes, path: Path) -> Path:
         True
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, html.page("In Bounds: the study", list(_body(outcomes))).encode())
+    write_whole(path, html.page("In Bounds: the study", list(_body(outcomes, on_section))).encode())
     return path
 
 
-def _body(outcomes: Outcomes) -> Iterator[str]:
+def _body(outcomes: Outcomes, on_section: Callable[[str], object]) -> Iterator[str]:
     """Yield the parts of the page."""
     sections = {
         "state": "What there is",
@@ -73,6 +74,7 @@ def _body(outcomes: Outcomes) -> Iterator[str]:
     }
 
     def heading(anchor: str) -> str:
+        on_section(sections[anchor])
         return html.heading(sections[anchor], 2, anchor)
 
     finished = f"{len(outcomes.finished)} of {len(outcomes.states)} cells are finished."
