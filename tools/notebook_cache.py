@@ -8,6 +8,7 @@ import hashlib
 import os
 import shutil
 import sys
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -64,9 +65,7 @@ def fill(code: str) -> Path:
     keys = {
         path.name: project.add_nb_to_project(str(path)).pk for path in (ROOT / "notebooks").glob("*.ipynb")
     }
-    with ProcessPoolExecutor(
-        AT_ONCE, initializer=os.environ.update, initargs=({"INBOUNDS_BOOK_BUILD": "1"},)
-    ) as pool:
+    with ProcessPoolExecutor(AT_ONCE, initializer=_start, initargs=(os.getpid(),)) as pool:
         running = {
             pool.submit(_execute, str(cache), key, timeout): name for name, key in sorted(keys.items())
         }
@@ -77,6 +76,18 @@ def fill(code: str) -> Path:
                 flush=True,
             )
     return cache
+
+
+def _start(parent: int) -> None:
+    """Prepare a process that executes: its outputs are for a page, and it ends when its parent does."""
+    os.environ["INBOUNDS_BOOK_BUILD"] = "1"
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os._exit(1)  # its kernel watches it, in turn
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _execute(cache: str, key: int, timeout: int) -> None:

@@ -1,0 +1,88 @@
+"""Each notebook is executed once; what failed is executed again; who fills the cache and is ended leaves nothing."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import nbformat
+import notebook_cache
+import psutil
+import pytest
+from jupyter_cache import get_cache
+from nbformat.v4 import new_code_cell, new_notebook
+
+KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
+TRACE = "import os; from pathlib import Path; Path({name!r}).open('a').write(f'{{os.getpid()}} ')"
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A tree with nothing but a folder for notebooks, and how long a cell may take."""
+    monkeypatch.setattr(notebook_cache, "ROOT", tmp_path)
+    monkeypatch.setattr(notebook_cache, "BUILD", tmp_path / "_build")
+    (tmp_path / "notebooks").mkdir()
+    (tmp_path / "_config.yml").write_text("execute: {timeout: 60}", encoding="utf8")
+    return tmp_path
+
+
+def write(tree: Path, name: str, *sources: str) -> Path:
+    """Write a notebook that leaves its kernel's process id in a file; return the file."""
+    file = tree / f"{name}.txt"
+    cells = [new_code_cell(source) for source in (TRACE.format(name=str(file)), *sources)]
+    nbformat.write(
+        new_notebook(cells=cells, metadata={"kernelspec": KERNEL}), tree / "notebooks" / f"{name}.ipynb"
+    )
+    return file
+
+
+def there(process: psutil.Process) -> bool:
+    try:
+        return process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+@pytest.mark.slow
+def test_a_notebook_is_executed_once_and_a_failing_one_again(
+    tree: Path, capsys: pytest.CaptureFixture
+) -> None:
+    good = write(tree, "good", "import os; print(os.environ['INBOUNDS_BOOK_BUILD'])")
+    bad = write(tree, "bad", "1 / 0")
+    stale = tree / "_build" / ".jupyter_cache" / "before"
+    stale.mkdir(parents=True)
+    for _ in range(2):
+        cache = notebook_cache.fill("now")
+    assert "2 of 2" in capsys.readouterr().out
+    assert [len(file.read_text(encoding="utf8").split()) for file in (good, bad)] == [1, 2]
+    assert not stale.exists()
+    kept = get_cache(cache).list_cache_records()
+    assert [Path(record.uri).stem for record in kept] == ["good"]
+    assert get_cache(cache).get_cache_bundle(kept[0].pk).nb.cells[1].outputs[0].text == "1\n"
+    assert "INBOUNDS_BOOK_BUILD" not in os.environ
+
+
+@pytest.mark.slow
+def test_who_is_ended_leaves_no_process(tree: Path) -> None:
+    file = write(tree, "long", "import time; time.sleep(600)")
+    code = (
+        "import notebook_cache, sys; from pathlib import Path;"
+        "notebook_cache.ROOT = Path(sys.argv[1]); notebook_cache.BUILD = notebook_cache.ROOT / '_build';"
+        "notebook_cache.fill('now')"
+    )
+    tools = str(Path(notebook_cache.__file__).parent)
+    environment = os.environ | {"PYTHONPATH": tools}
+    with subprocess.Popen([sys.executable, "-c", code, str(tree)], env=environment) as filling:
+        deadline = time.monotonic() + 120
+        while not file.exists() or not file.read_text(encoding="utf8"):
+            assert time.monotonic() < deadline, "the notebook never began"
+            time.sleep(0.1)
+        kernel = psutil.Process(int(file.read_text(encoding="utf8")))
+        worker = kernel.parent()
+        assert worker is not None
+        assert worker.pid != filling.pid
+        filling.terminate()
+    while there(worker) or there(kernel):
+        assert time.monotonic() < deadline, "a process outlives the one that started it"
+        time.sleep(0.1)
