@@ -7,12 +7,23 @@ from playwright.sync_api import Browser, BrowserContext
 
 from tests.pages import browser as book
 
+SHARED = {"seen": "Firefox", "webgl": "WebGL", "tool": "paper"}
+"""Fixtures of a module that are made at some cost, and what they are called among the workers."""
 
+
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Everything in this folder needs the built book and a browser."""
+    """Everything in this folder needs the built book and a browser; what shares a visit goes to one worker."""
     for item in items:
         if "tests/pages" in item.path.as_posix():
             item.add_marker(pytest.mark.pages)
+            groups = [
+                name for fixture, name in SHARED.items() if fixture in getattr(item, "fixturenames", ())
+            ]
+            if visited := getattr(item, "callspec", None) and item.callspec.params.get("visit"):
+                groups = [visited]
+            for group in groups:
+                item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.fixture(scope="session")

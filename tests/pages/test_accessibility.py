@@ -1,10 +1,9 @@
-"""axe-core on every page, in both themes: no violation that it calls serious or critical."""
+"""What axe-core calls serious or critical, in a theme; `test_every_page.py` asks it of every page."""
 
 from pathlib import Path
 from typing import Any
 
 import axe_playwright_python
-import pytest
 from playwright.sync_api import BrowserContext, Page
 
 from tests.pages import browser as book
@@ -39,18 +38,6 @@ def serious(page: Page, theme: str, options: dict[str, Any]) -> list[Any]:
     # Colours fade over; axe must not read them on their way.
     page.evaluate("() => Promise.all(document.getAnimations().map((one) => one.finished.catch(() => null)))")
     return [found for found in page.evaluate(RUN, options) if found[0] in ("serious", "critical")]
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_nothing_serious_in_either_theme(context: BrowserContext, address: str, name: str) -> None:
-    page = context.new_page()
-    page.add_init_script(book.choose_theme("light"))
-    page.goto(address + name, wait_until="networkidle")
-    page.evaluate(book.AT_REST)
-    page.evaluate(THIN_OUT)
-    page.evaluate(AXE)
-    assert serious(page, "light", EVERYTHING) == []
-    assert serious(page, "dark", COLOURS) == []
 
 
 def test_axe_sees_what_is_wrong(context: BrowserContext, address: str) -> None:

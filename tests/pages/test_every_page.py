@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
 
 from tests.pages import browser as book
+from tests.pages.test_accessibility import AXE, COLOURS, EVERYTHING, THIN_OUT, serious
 
 PAGES = book.pages()
 LOCAL_SCHEMES = {"data", "blob", "about"}
@@ -20,6 +21,7 @@ class Visit:
     name: str
     address: str
     page: Page
+    shift: float = 0.0
     requests: list[str] = field(default_factory=list)
     bad_responses: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
@@ -50,8 +52,10 @@ def visit(request: pytest.FixtureRequest, browser: Browser, address: str) -> Ite
     page.on("requestfailed", visit.on_failure)
     page.on("console", visit.on_console)
     page.on("pageerror", lambda error: visit.complaints.append(f"exception: {error}"))
+    page.add_init_script(book.SHIFT)
     page.goto(address + request.param, wait_until="networkidle")
     page.evaluate(book.AT_REST)
+    visit.shift = page.evaluate("window.shift")
     yield visit
     context.close()
 
@@ -80,6 +84,13 @@ def test_nothing_is_asked_of_another_host(visit: Visit) -> None:
 def test_all_that_the_page_asks_for_is_there(visit: Visit) -> None:
     assert visit.bad_responses == []
     assert len(visit.requests) > 5  # the page, its styles, its scripts
+
+
+def test_nothing_moves_while_it_opens(visit: Visit) -> None:
+    if visit.shift > book.STEADY:  # the first look, on a busy machine
+        context = visit.page.context.browser.new_context(viewport=book.DESKTOP)
+        assert book.shift_of(context, visit.address + visit.name, "read") <= book.STEADY
+        context.close()
 
 
 def test_console_is_clean(visit: Visit) -> None:
@@ -255,3 +266,29 @@ def test_links_inside_the_book_lead_somewhere(visit: Visit) -> None:
             if f'id="{anchor}"' not in text and f'name="{anchor}"' not in text:
                 dead.append(target)
     assert dead == []
+
+
+def test_some_page_has_figures() -> None:
+    assert book.pages('<figure class="inbounds-figure">')
+
+
+def test_figures_are_numbered_and_say_what_their_alt_text_says(visit: Visit) -> None:
+    told = visit.page.eval_on_selector_all(
+        "figure.inbounds-figure",
+        """nodes => nodes.map((node) => [node.querySelector('.number').textContent, node.querySelector('img').alt,
+          [...node.querySelectorAll('[aria-hidden], details > p')].map((part) => part.textContent).join(' ')])""",
+    )
+    numbers = visit.page.locator("figure > figcaption > .number").all_text_contents()
+    assert numbers == [f"Figure {i}." for i in range(1, len(numbers) + 1)]
+    assert {number for number, _, _ in told} <= set(numbers)
+    assert all(alt == caption for _, alt, caption in told)
+
+
+def test_axe_finds_nothing_serious_in_either_theme(visit: Visit) -> None:
+    """The last one, because it thins the page out."""
+    visit.page.set_viewport_size(book.DESKTOP)
+    visit.page.evaluate(book.AT_REST)
+    visit.page.evaluate(THIN_OUT)
+    visit.page.evaluate(AXE)
+    assert serious(visit.page, "light", EVERYTHING) == []
+    assert serious(visit.page, "dark", COLOURS) == []
