@@ -62,13 +62,16 @@ def fill(code: str) -> Path:
     cache.mkdir(parents=True, exist_ok=True)
     timeout = yaml.safe_load((ROOT / "_config.yml").read_text())["execute"]["timeout"]  # of a cell, seconds
     project, start = get_cache(cache), time.perf_counter()
-    keys = {
-        path.name: project.add_nb_to_project(str(path)).pk for path in (ROOT / "notebooks").glob("*.ipynb")
-    }
+    keys = {}
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        try:
+            project.match_cache_file(str(path))
+        except KeyError:
+            keys[path.name] = project.add_nb_to_project(str(path)).pk
+    if not keys:
+        return cache
     with ProcessPoolExecutor(AT_ONCE, initializer=_start, initargs=(os.getpid(),)) as pool:
-        running = {
-            pool.submit(_execute, str(cache), key, timeout): name for name, key in sorted(keys.items())
-        }
+        running = {pool.submit(_execute, str(cache), key, timeout): name for name, key in keys.items()}
         for count, done in enumerate(as_completed(running), 1):
             done.result()
             print(
@@ -91,7 +94,7 @@ def _start(parent: int) -> None:
 
 
 def _execute(cache: str, key: int, timeout: int) -> None:
-    """Execute a notebook of the cache's project, unless the cache has it already; called in a process of its own."""
+    """Execute a notebook of the cache's project; called in a process of its own."""
     from jupyter_cache import get_cache
     from jupyter_cache.executors import load_executor
 

@@ -9,6 +9,8 @@ from tests.pages import browser as book
 
 SHARED = {"seen": "Firefox", "webgl": "WebGL", "tool": "paper"}
 """Fixtures of a module that are made at some cost, and what they are called among the workers."""
+PER_PAGE = ("visit", "opened")
+"""Fixtures of a module that open a page once; the workers call them by the page's name."""
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
@@ -17,11 +19,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "tests/pages" in item.path.as_posix():
             item.add_marker(pytest.mark.pages)
-            groups = [
-                name for fixture, name in SHARED.items() if fixture in getattr(item, "fixturenames", ())
-            ]
-            if visited := getattr(item, "callspec", None) and item.callspec.params.get("visit"):
-                groups = [visited]
+            given = item.callspec.params if hasattr(item, "callspec") else {}
+            made = getattr(item, "fixturenames", ())
+            groups = [name for fixture, name in SHARED.items() if fixture in made]
+            groups += [given[fixture] for fixture in PER_PAGE if fixture in given]
             for group in groups:
                 item.add_marker(pytest.mark.xdist_group(group))
 

@@ -2,10 +2,11 @@
 
 import math
 import re
+from collections.abc import Iterator
 
 import pytest
 import torch
-from playwright.sync_api import BrowserContext, Locator, Page
+from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
 from inbounds.book.explorables.bounded_densities import bounded_densities
 from inbounds.book.explorables.frame import javascript_files
@@ -50,6 +51,15 @@ def open_page(context: BrowserContext, url: str) -> Page:
     return page
 
 
+@pytest.fixture(scope="module", params=PAGES)
+def opened(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Page]:
+    """A page that is opened once, for all tests that leave it usable."""
+    context = browser.new_context(viewport=book.DESKTOP)
+    context.set_default_timeout(20_000)
+    yield open_page(context, address + request.param)
+    context.close()
+
+
 def explorables(page: Page) -> list[Locator]:
     found = page.locator(".inbounds-explorable").all()
     assert found
@@ -64,10 +74,8 @@ def test_some_page_has_an_explorable() -> None:
     assert PAGES
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_renders(context: BrowserContext, address: str, name: str) -> None:
-    page = open_page(context, address + name)
-    for explorable in explorables(page):
+def test_renders(opened: Page) -> None:
+    for explorable in explorables(opened):
         assert explorable.get_attribute("data-state") == "live"
         assert explorable.evaluate(PAINTED) > 2000
         assert not explorable.locator(".inbounds-static").is_visible()
@@ -75,10 +83,8 @@ def test_renders(context: BrowserContext, address: str, name: str) -> None:
         assert len(explorable.locator(".inbounds-note").inner_text()) > 20
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_answers_the_keyboard(context: BrowserContext, address: str, name: str) -> None:
-    page = open_page(context, address + name)
-    for explorable in explorables(page):
+def test_answers_the_keyboard(opened: Page) -> None:
+    for explorable in explorables(opened):
         handles = explorable.locator("[role=slider]").all()
         assert handles
         labels = [handle.get_attribute("aria-label") for handle in handles]
@@ -87,8 +93,8 @@ def test_answers_the_keyboard(context: BrowserContext, address: str, name: str) 
         for handle in handles:
             handle.focus()
             before = readout(explorable), handle.get_attribute("aria-valuetext")
-            page.keyboard.press("ArrowLeft")
-            page.keyboard.press("ArrowLeft")
+            opened.keyboard.press("ArrowLeft")
+            opened.keyboard.press("ArrowLeft")
             after = readout(explorable), handle.get_attribute("aria-valuetext")
             assert before[0] != after[0]
             assert before[1] != after[1]
@@ -98,44 +104,40 @@ def test_answers_the_keyboard(context: BrowserContext, address: str, name: str) 
             assert after[1] == shown
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_sliders_are_reached_by_tab(context: BrowserContext, address: str, name: str) -> None:
-    page = open_page(context, address + name)
+def test_sliders_are_reached_by_tab(opened: Page) -> None:
     focused = """() => {
       let node = document.activeElement;
       while (node?.shadowRoot?.activeElement) node = node.shadowRoot.activeElement;
       return node?.getAttribute('aria-label');
     }"""
-    for explorable in explorables(page):
+    for explorable in explorables(opened):
         handles = explorable.locator("[role=slider]").all()
         handles[0].focus()
         for handle in handles[1:]:
-            page.keyboard.press("Tab")
-            assert page.evaluate(focused) == handle.get_attribute("aria-label")
-        page.keyboard.press("Tab")
-        assert page.evaluate(focused) not in [
+            opened.keyboard.press("Tab")
+            assert opened.evaluate(focused) == handle.get_attribute("aria-label")
+        opened.keyboard.press("Tab")
+        assert opened.evaluate(focused) not in [
             handle.get_attribute("aria-label") for handle in handles
         ]  # no trap
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_follows_the_theme(context: BrowserContext, address: str, name: str) -> None:
+def test_follows_the_theme(opened: Page) -> None:
     """The reader presses the theme's own button; text stays readable and the canvas is painted anew."""
-    page = open_page(context, address + name)
-    button = page.locator("button.theme-switch-button:visible").first
+    button = opened.locator("button.theme-switch-button:visible").first
     pictures = {}
     for theme in ("light", "dark", "light"):
         for _ in range(3):  # the button goes round: system, light, dark
-            if page.locator("html").get_attribute("data-mode") == theme:
+            if opened.locator("html").get_attribute("data-mode") == theme:
                 break
             button.click()
-        assert page.locator("html").get_attribute("data-theme") == theme
-        for number, explorable in enumerate(explorables(page)):
+        assert opened.locator("html").get_attribute("data-theme") == theme
+        for number, explorable in enumerate(explorables(opened)):
             assert explorable.get_attribute("data-theme") == theme
             for text in ("thead th", "tbody th", "tbody td", ".inbounds-note", ".bk-slider-title"):
                 assert explorable.locator(text).first.evaluate(CONTRAST) > 4.5, (theme, text)
             explorable.locator(".inbounds-note").scroll_into_view_if_needed()
-            page.wait_for_timeout(200)
+            opened.wait_for_timeout(200)
             picture = explorable.locator(".inbounds-plot").screenshot()
             assert picture != pictures.get((number, "dark")), "still painted for the dark theme"
             pictures[number, theme] = picture
@@ -182,11 +184,9 @@ def test_leaves_a_figure_where_it_cannot_run(
     bare.close()
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_prints_the_figure(context: BrowserContext, address: str, name: str) -> None:
-    page = open_page(context, address + name)
-    page.emulate_media(media="print")
-    for explorable in explorables(page):
+def test_prints_the_figure(opened: Page) -> None:
+    opened.emulate_media(media="print")
+    for explorable in explorables(opened):
         assert explorable.locator(".inbounds-static img").is_visible()
         assert not explorable.locator(".inbounds-live").is_visible()
 

@@ -1,12 +1,13 @@
 """Videos in the built book play when the reader asks, and end."""
 
 import io
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext, Locator
+from playwright.sync_api import Browser, Locator, Page
 
 from inbounds.book.drawing import videos
 from inbounds.robots import Film
@@ -26,12 +27,19 @@ def test_some_page_has_a_video() -> None:
     assert PAGES
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_videos_play(context: BrowserContext, address: str, name: str) -> None:
+@pytest.fixture(scope="module", params=PAGES)
+def opened(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Page]:
+    """A page with films, opened once."""
+    context = browser.new_context(viewport=book.DESKTOP)
     page = context.new_page()
     page.emulate_media(reduced_motion="reduce")  # else those of the front page begin by themselves
-    page.goto(address + name)
-    for video in page.locator("video").all():
+    page.goto(address + request.param)
+    yield page
+    context.close()
+
+
+def test_videos_play(opened: Page) -> None:
+    for video in opened.locator("video").all():
         assert video.evaluate("node => node.paused && node.currentTime === 0"), "it started by itself"
         video.scroll_into_view_if_needed()
         played = video.evaluate(PLAY)
@@ -41,12 +49,8 @@ def test_videos_play(context: BrowserContext, address: str, name: str) -> None:
         assert played["duration"] <= 5.05
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_videos_stop_at_their_end(context: BrowserContext, address: str, name: str) -> None:
-    page = context.new_page()
-    page.emulate_media(reduced_motion="reduce")
-    page.goto(address + name)
-    video = page.locator("video").first
+def test_videos_stop_at_their_end(opened: Page) -> None:
+    video = opened.locator("video").first
     video.evaluate("node => { node.muted = true; node.playbackRate = 8; return node.play(); }")
     video.evaluate("node => node.ended || new Promise((done) => node.addEventListener('ended', done))")
     assert video.evaluate("node => node.paused || node.ended")
