@@ -11,7 +11,7 @@ from collections import Counter
 import pytest
 
 FIRST = ("test_compiled.py",)
-"""What leaves compiled functions on disk, where others find them: in copies of the package, too, with planted errors."""
+"""What leaves compiled functions on disk, where others find them: copies of the package, too, with planted errors."""
 
 
 @pytest.hookimpl(trylast=True)
