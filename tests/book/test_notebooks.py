@@ -164,7 +164,7 @@ def test_nbval_sees_a_dead_kernel(tmp_path: Path) -> None:
     notebook.cells.append(nbformat.v4.new_code_cell("import os; os._exit(1)", execution_count=2))
     notebook.cells.append(nbformat.v4.new_code_cell("print('never')", execution_count=3))
     nbformat.write(notebook, tmp_path / "chapter.ipynb")
-    assert nbval(tmp_path, "--cell-timeout=30").returncode != 0  # nbval waits for it as long as for any cell
+    assert nbval(tmp_path, "--cell-timeout=15").returncode != 0  # nbval waits for it as long as for any cell
 
 
 def quote(cell: nbformat.NotebookNode, value: str) -> None:
