@@ -145,6 +145,16 @@ class Cell:
         return "-".join(part for part in parts if part)
 
     @property
+    def kept_seeds(self) -> tuple[int, ...]:
+        """The seeds whose policies are kept, in the order of their files.
+
+        Example:
+            >>> Cell("equal", "ppo", "beta", "Humanoid", keeps_policies=True, keeps_seeds=(0, 2)).kept_seeds
+            (0, 2)
+        """
+        return self.seeds if self.keeps_seeds is None else self.keeps_seeds
+
+    @property
     def config(self) -> TrainConfig:
         """The whole configuration."""
         start = preset(

@@ -125,7 +125,7 @@ def read_ways(folder: StudyFolder, cell: Cell) -> dict[str, Played]:
     table = store.read_cell(path)
     if said := wrong_ways(cell, table):
         raise store.damaged(path, said)
-    names, shape = table["way"].to_pylist(), (len(cell.seeds), EPISODES[cell.robot])
+    names, shape = table["way"].to_pylist(), (len(cell.kept_seeds), EPISODES[cell.robot])
     found = {}
     for way in ways_of(cell.family):
         mine = np.array([name == way for name in names])
@@ -174,10 +174,8 @@ def wrong_ways(cell: Cell, table: pa.Table) -> str:
             return f"column {name} is of the type {table.schema.field(name).type}"
     rows = list(zip(*(table[name].to_pylist() for name in ("way", "seed", "episode")), strict=True))
     ways, episodes = ways_of(cell.family), EPISODES[cell.robot]
-    if rows != [(way, seed, e) for way in ways for seed in cell.seeds for e in range(episodes)]:
-        return (
-            f"{len(rows)} rows that are not {', '.join(ways)} × {len(cell.seeds)} seeds × {episodes} episodes"
-        )
+    if rows != [(way, seed, e) for way in ways for seed in cell.kept_seeds for e in range(episodes)]:
+        return f"{len(rows)} rows that are not {', '.join(ways)} × {len(cell.kept_seeds)} seeds × {episodes} episodes"
     return ""
 
 

@@ -1,5 +1,6 @@
 """Evaluations: starts and returns of the final evaluation, bang-bang and doing nothing, written whole, resumable."""
 
+import dataclasses
 import json
 import shutil
 from collections.abc import Iterator
@@ -221,3 +222,15 @@ def test_nothing_is_published_once(folder: StudyFolder) -> None:
     said: list[str] = []
     evaluate_cells([cell_of("gaussian")], folder, said.append)
     assert said == ["nothing: played"]
+
+
+def test_of_some_seeds_the_kept_are_played(short_episodes: None, tmp_path: Path) -> None:
+    whole = small_cell(family="beta", seeds=(3, 4, 5), epochs=1, keeps_policies=True)
+    some, folder = dataclasses.replace(whole, arm="some", keeps_seeds=(5, 3)), folder_in(tmp_path)
+    for cell in (some, whole):
+        run_cell(cell, folder)
+    assert evaluate_cells([some, whole], folder) == [some, whole]
+    assert checks.wrong_evaluation(some, folder) == ""
+    assert checks.check_replay(some, folder).ok
+    two, three = (read_ways(folder, cell)["median"] for cell in (some, whole))
+    np.testing.assert_array_equal(two.returns, three.returns[[2, 0]])

@@ -71,4 +71,4 @@ def final_policies(outcomes: Outcomes, outcome: Outcome) -> list[TrainedPolicy]:
     if not cell.keeps_policies:
         raise FileNotFoundError(f"{cell.id}: arm {cell.arm} keeps no policies, only curves and measurements")
     file = outcomes.folder.policy_files(cell)[0]
-    return [load_policy(file, index) for index in range(len(cell.seeds))]
+    return [load_policy(file, index) for index in range(len(cell.kept_seeds))]

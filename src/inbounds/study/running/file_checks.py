@@ -89,9 +89,7 @@ def wrong_policies(cell: Cell, path: Path) -> str:
         policies = load_policies(path)
     except (ValueError, KeyError, IndexError, RuntimeError) as error:
         return str(error).partition(": ")[0]
-    kept = (
-        cell.config if cell.keeps_seeds is None else dataclasses.replace(cell.config, seeds=cell.keeps_seeds)
-    )
+    kept = dataclasses.replace(cell.config, seeds=cell.kept_seeds)
     if different := changed_fields(kept, describe(policies[0].config)):
         name, (there, here) = next(iter(different.items()))
         return f"these are policies of another configuration ({name} is {there!r} instead of {here!r})"

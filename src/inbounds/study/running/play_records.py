@@ -132,7 +132,7 @@ def records_of(cell: Cell, folder: StudyFolder) -> list[dict[str, Any]]:
         (60, 'latent, float32', 0.0)
     """
     players = _Recorder(run_with_policies(cell, folder))
-    seeds = cell.seeds
+    seeds = cell.kept_seeds
     starts = [int(final_starts(seed)[0]) for seed in seeds]
     _, lengths = players.play("sample", starts, [generator_of(seed, FINAL + 1) for seed in seeds])
     players.close()

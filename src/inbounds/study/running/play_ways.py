@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,7 @@ def final_starts(seed: int) -> NDArray[Any]:
 
 
 def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
-    """Return a run of a cell in which the shipped policies stand; its values and its past are not theirs.
+    """Return a run of a cell's kept seeds in which the shipped policies stand; its values and its past are not theirs.
 
     Args:
         cell: which keeps its policies.
@@ -115,7 +116,7 @@ def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
     path = folder.policy_files(cell)[0]
     load_policies(path)  # looks at its checksum
     tensors = safetensors.numpy.load_file(path)
-    trainer = Trainer(cell.config)
+    trainer = Trainer(replace(cell.config, seeds=cell.kept_seeds))
     with torch.no_grad():
         for i, layer in enumerate(trainer.networks.actor.layers):
             layer.weight[:] = torch.from_numpy(tensors[f"policy.{i}.weight"])
