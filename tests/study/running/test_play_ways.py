@@ -233,4 +233,5 @@ def test_of_some_seeds_the_kept_are_played(short_episodes: None, tmp_path: Path)
     assert checks.wrong_evaluation(some, folder) == ""
     assert checks.check_replay(some, folder).ok
     two, three = (read_ways(folder, cell)["median"] for cell in (some, whole))
-    np.testing.assert_array_equal(two.returns, three.returns[[2, 0]])
+    np.testing.assert_allclose(two.returns, three.returns[[2, 0]], rtol=1e-4, atol=1e-4)  # another batch
+    assert abs(two.returns - three.returns[:2]).max() > 0.1

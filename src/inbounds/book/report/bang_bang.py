@@ -53,7 +53,7 @@ def rows_of(folder: StudyFolder) -> list[BangBangRow]:
         ways = read_ways(folder, cell)
         median = ways["median"].returns.mean(1)  # [S]
         gains: dict[str, Estimate] = {way: gain(ways[way].returns.mean(1), median) for way in WAYS}
-        gains[NOTHING] = gain(nothing[cell.robot].mean(1), median)
+        gains[NOTHING] = gain(nothing[cell.robot].mean(1)[: len(median)], median)
         actions = ways["median"].actions
         rows.append(
             BangBangRow(

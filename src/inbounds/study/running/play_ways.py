@@ -1,7 +1,8 @@
 """Play the shipped policies by every way to act, from the starts of their final evaluation.
 
 The policies stand in a run again, as they were when their final evaluation was played, so that mean, median, mode
-and sample repeat the returns of `results/policies` bit for bit on the processor of that evaluation.
+and sample repeat the returns of `results/policies` bit for bit on the processor of that evaluation (to rounding, where
+not all of a cell's policies are kept: a batch of another size rounds otherwise).
 """
 
 from __future__ import annotations
