@@ -9,10 +9,12 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from inbounds.book.drawing import figures
-from inbounds.book.report import study_pages, ways_to_act
+from inbounds.book.report import bang_bang, study_pages, ways_to_act
 from inbounds.book.report.ways_to_act import Row
+from inbounds.study.grid import all_cells
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate
+from inbounds.study.ways_played import evaluated
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +93,10 @@ def test_each_panel_has_each_row(figure: Figure, rows: list[Row]) -> None:
     assert len(figure.axes) == len(ways_to_act.WAYS)
     for ax in figure.axes:
         assert len(ax.containers) == len(rows)
+
+
+def test_what_three_seeds_did_at_the_bounds_is_no_row(outcomes: Outcomes) -> None:
+    played = evaluated(outcomes.folder, all_cells())
+    rows = bang_bang.rows_of(outcomes.folder)
+    assert len(rows) == sum(len(cell.kept_seeds) == 10 for cell in played) > 50
+    assert not any("Humanoid" in row.robot and "equal" in row.label for row in rows)

@@ -22,6 +22,9 @@ from inbounds.study.ways_played import NOTHING, evaluated, read_nothing, read_wa
 WAYS: Mapping[str, str] = {"median-snapped": "median, snapped", "sample-snapped": "sample, snapped"}
 """What is compared with the median as it is, and its panel's title."""
 
+ENOUGH = 10
+"""Seeds, for an interval: a cell that keeps the policies of fewer is left out."""
+
 
 @dataclass(frozen=True)
 class BangBangRow(Row):
@@ -39,7 +42,7 @@ class BangBangRow(Row):
 
 
 def rows_of(folder: StudyFolder) -> list[BangBangRow]:
-    """Return one row for each cell whose policies have been played, robot by robot.
+    """Return one row for each cell of whose seeds enough have been played, robot by robot.
 
     Example:
         >>> rows = rows_of(StudyFolder())  # in the project's folder
@@ -50,10 +53,12 @@ def rows_of(folder: StudyFolder) -> list[BangBangRow]:
     nothing = read_nothing(folder)
     rows = []
     for cell in evaluated(folder, all_cells()):
+        if len(cell.kept_seeds) < ENOUGH:
+            continue
         ways = read_ways(folder, cell)
         median = ways["median"].returns.mean(1)  # [S]
         gains: dict[str, Estimate] = {way: gain(ways[way].returns.mean(1), median) for way in WAYS}
-        gains[NOTHING] = gain(nothing[cell.robot].mean(1)[: len(median)], median)
+        gains[NOTHING] = gain(nothing[cell.robot].mean(1), median)
         actions = ways["median"].actions
         rows.append(
             BangBangRow(
