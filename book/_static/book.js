@@ -51,17 +51,22 @@
     root.dataset.layered = "";
     document.querySelectorAll(".btn-layer-button").forEach((button) => { button.ariaPressed = String(open); });
   };
-  window.inboundsSwitchLayer = () => {
+  const switchTo = (layer) => {
     /* What the reader looks at stays where it is. */
     const top = (node) => node.getBoundingClientRect().top;
     const seen = [...document.querySelectorAll("article :is(p, h1, h2, h3, li, figure, summary)")]
       .find((node) => node.checkVisibility() && top(node) > 80);
     const before = seen && top(seen);
-    root.dataset.layer = root.dataset.layer === "code" ? "read" : "code";
-    try { localStorage.setItem("inbounds-layer", root.dataset.layer); } catch { /* then it holds for this page */ }
+    root.dataset.layer = layer;
     showLayer();
     if (seen) scrollBy({ top: top(seen) - before, behavior: "instant" });
   };
+  window.inboundsSwitchLayer = () => {
+    switchTo(root.dataset.layer === "code" ? "read" : "code");
+    try { localStorage.setItem("inbounds-layer", root.dataset.layer); } catch { /* then it holds for this page */ }
+  };
+  /* Pages that are open beside this one follow, and so does one that opened before the choice had been written down. */
+  addEventListener("storage", ({ key, newValue }) => { if (key === "inbounds-layer") switchTo(newValue ?? "read"); });
   showLayer();
 
   /* Paper has no folds: all of them open before printing, and close again. */

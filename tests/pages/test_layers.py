@@ -25,6 +25,13 @@ def folds(page: Page) -> list[list[bool]]:
     return found
 
 
+def wait_until(page: Page, is_open: str) -> None:
+    """Until every fold is as a script says (a page beside another learns of its choice a moment later)."""
+    page.wait_for_function(
+        f"[...document.querySelectorAll('details.inbounds-code')].every((node) => {is_open})"
+    )
+
+
 def test_some_page_has_code() -> None:
     assert set(SEVERAL) <= set(PAGES)
 
@@ -53,9 +60,21 @@ def test_switch_is_remembered_on_other_pages(context: BrowserContext, address: s
     assert switch.get_attribute("aria-pressed") == "true"
     assert all(is_open for is_open, _ in folds(page))
     page.goto(start + PAGES[-1])
-    assert all(is_open for is_open, _ in folds(page))
+    wait_until(page, "node.open")
     page.locator(".btn-layer-button").click()
     assert all(is_open == stays for is_open, stays in folds(page))
+
+
+@pytest.mark.parametrize("scheme", ["http", "file"])
+def test_a_page_beside_it_follows_the_switch(context: BrowserContext, address: str, scheme: str) -> None:
+    start = address if scheme == "http" else f"{book.HTML.as_uri()}/"
+    first, beside = context.new_page(), context.new_page()
+    first.goto(start + PAGES[0])
+    beside.goto(start + PAGES[-1])
+    for is_open in ("node.open", "node.open === node.matches('.stays-open')"):
+        first.locator(".btn-layer-button").click()
+        wait_until(beside, is_open)
+    assert beside.locator(".btn-layer-button").get_attribute("aria-pressed") == "false"
 
 
 def test_without_scripts_everything_is_open(browser: Browser, address: str) -> None:
