@@ -43,7 +43,8 @@ KINDS = """() => {
 }"""
 COLOURS = ["color-contrast", "link-in-text-block"]
 RUN = f"""async (colours) => {{
-  const look = async (where, options) => (await axe.run(where, {{ resultTypes: ['violations'], ...options }})).violations;
+  const look = async (where, options) =>
+    (await axe.run(where, {{ resultTypes: ['violations'], ...options }})).violations;
   const all = await look({{ include: ({KINDS})() }}, {{ runOnly: colours }});
   if (document.documentElement.dataset.theme === 'light') {{
     const rules = Object.fromEntries(colours.map((rule) => [rule, {{ enabled: false }}]));
