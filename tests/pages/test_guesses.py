@@ -57,6 +57,8 @@ def test_guesses_are_scored_and_remembered(context: BrowserContext, address: str
     assert page.locator(".inbounds-guess input:enabled").count() == 0
     page.get_by_role("button", name="Forget all my guesses").click()
     assert page.locator(".guess-tally").inner_text() == "Forgotten."
+    page.reload()
+    assert all(text == "" for text in page.locator(".guess-result").all_inner_texts())
     page.goto(start + CHOICES[0])
     assert all(text == "" for text in page.locator(".guess-result").all_inner_texts())
 
