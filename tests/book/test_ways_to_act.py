@@ -100,3 +100,5 @@ def test_what_three_seeds_did_at_the_bounds_is_no_row(outcomes: Outcomes) -> Non
     rows = bang_bang.rows_of(outcomes.folder)
     assert len(rows) == sum(len(cell.kept_seeds) == 10 for cell in played) > 50
     assert not any("Humanoid" in row.robot and "equal" in row.label for row in rows)
+    assert any("equal" in row.label for row in rows)
+    assert len({(row.robot, row.label) for row in rows}) == len(rows)

@@ -68,6 +68,14 @@ def test_a_grader_that_is_not_shown_is_not_reached(tmp_path: Path) -> None:
     assert [row[1] for row in graded(path)] == ["not reached"]
 
 
+@pytest.mark.slow
+def test_every_mark_is_that_of_its_own_exercise(tmp_path: Path) -> None:
+    """A cell that raises, or calls a grader without showing it, moves no other exercise's mark."""
+    hidden = "print(graders.bits_for(bits_for).message)"
+    path = notebook(tmp_path / "a.ipynb", IMPORTS, RIGHT, "graders.bits_for(undefined)", hidden, CALL)
+    assert [row[:2] for row in graded(path)] == [("bits_for", "not reached"), ("bits_for", "passed")]
+
+
 def test_files_that_are_no_such_notebook(tmp_path: Path) -> None:
     text = tmp_path / "a.ipynb"
     text.write_text("{", encoding="utf8")

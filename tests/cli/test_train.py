@@ -193,7 +193,7 @@ def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) ->
     ("more", "difference"),
     [
         (["--algorithm.clip-range", "0.1"], "(--algorithm.clip-range 0.2 there, 0.1 here)"),
-        (["--policy", "beta"], "(--policy.family logit-normal there, beta here)"),
+        (["--policy", "beta"], "(--policy logit-normal there, beta here)"),
         (["--algo", "trpo"], "(--algo ppo there, trpo here)"),
     ],
 )

@@ -6,8 +6,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from gymnasium import spaces
 
+from inbounds.distributions import LogitNormal
+from inbounds.distributions.bounds import require_bounds
 from inbounds.distributions.boxes import require_box
 
 
@@ -86,3 +89,15 @@ def test_the_remedy_for_observations_works(space: spaces.Space, flat: int) -> No
     found = gymnasium.wrappers.FlattenObservation(env).observation_space
     assert isinstance(found, spaces.Box)
     assert found.shape == (flat,)
+
+
+def test_bounds_are_kept_apart_from_the_callers_memory() -> None:
+    low = np.array([-1.0, -1.0], np.float32)
+    kept, _ = require_bounds(low, np.broadcast_to(np.float32(1), 2))  # the second may not be written to
+    low[0] = -5
+    assert kept.tolist() == [-1.0, -1.0]
+
+
+def test_a_numpy_number_adapts_as_any_number_does() -> None:
+    assert LogitNormal(torch.zeros(2), np.exp(-0.5)).mean.dtype == torch.float32
+    assert LogitNormal(torch.zeros(2), np.array(0.6)).mean.dtype == torch.float64

@@ -272,3 +272,24 @@ def test_entropy_falls_with_the_concentration(omega: float, concentration: float
     for slope, x in zip(slopes, (a, b), strict=True):
         expected = both - scipy.special.polygamma(1, x) * (x - 1)
         assert float(slope) == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("steps", [1, 3, 5, 9, 1000])
+def test_the_mode_stays_in_the_box_where_the_law_is_nearly_uniform(steps: int) -> None:
+    """In float32 α + β − 2 would round, and half of the mode's fraction with it."""
+    alpha = torch.tensor(1.0) + steps * torch.finfo(torch.float32).eps
+    assert ScaledBeta(alpha, 1.0, -1.0, 1.0).mode.item() == 1.0
+    assert ScaledBeta(alpha, alpha, -1.0, 1.0).mode.item() == 0.0
+
+
+def test_a_law_by_its_mode_is_made_and_compared_under_vmap() -> None:
+    modes, highs = torch.tensor([-0.5, 0.2]), torch.tensor([1.0, 2.0])
+    found = torch.vmap(lambda mode: ScaledBeta.from_mode(mode, 8.0, -1.0, 1.0).entropy())(modes)
+    assert torch.equal(found, ScaledBeta.from_mode(modes, 8.0, -1.0, 1.0).entropy())
+
+    def apart(mode: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
+        p, q = (ScaledBeta.from_mode(mode, k, -1.0, high, validate_args=False) for k in (8.0, 3.0))
+        return kl_divergence(p, q)
+
+    one_by_one = torch.stack([apart(mode, high) for mode, high in zip(modes, highs, strict=True)])
+    assert torch.allclose(torch.vmap(apart)(modes, highs), one_by_one)

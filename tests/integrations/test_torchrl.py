@@ -1,5 +1,6 @@
 """The laws of the book in TorchRL: losses read latents, environments get actions, and TanhNormal is an old friend."""
 
+import pickle
 import warnings
 
 import numpy as np
@@ -51,6 +52,7 @@ def test_the_actor_scores_actions_and_the_environment_gets_them(law: type) -> No
     with torch.no_grad():
         batch = acting(observations(500))
     low, high = torch.from_numpy(LOW), torch.from_numpy(HIGH)
+    assert (batch["latent"] - batch[PARAMETERS[law][0]]).std() > 0.1  # it draws, also where nobody says so
     expected = low + (high - low) * torch.sigmoid(batch["latent"])
     assert torch.allclose(batch["action"], expected, rtol=1e-5, atol=1e-5)
     first, second = (batch[name].double() for name in PARAMETERS[law])
@@ -135,6 +137,20 @@ def test_a_rollout_in_a_batch_of_environments(law: type) -> None:
     assert not batch["next", "terminated"].any()
     assert (batch["next", "observation"][over][:, 1] == 1).all()  # the clock at the end of an episode
     assert (batch["observation"][:, HORIZON, 1] == 0).all()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_an_actor_can_be_saved(law: type) -> None:
+    _, acting = bounded_actor(network(law), law, LOW, HIGH)
+    again = pickle.loads(pickle.dumps(acting))
+    with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+        assert torch.equal(again(observations(5))["action"], acting(observations(5))["action"])
+
+
+def test_a_mean_of_latents_is_refused() -> None:
+    _, acting = bounded_actor(network(LogitNormal), LogitNormal, LOW, HIGH)
+    with set_exploration_type(ExplorationType.MEAN), pytest.raises(ValueError, match="no mean of actions"):
+        acting(observations(5))
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -108,7 +108,7 @@ def test_torchrl_learns_from_a_quiet_start(law: type) -> None:
     assert_improved(before, returns(act))
 
 
-@pytest.mark.parametrize("std", [0.2, 0.4, 0.55])
+@pytest.mark.parametrize("std", [0.02, 0.2, 0.4, 0.55])
 @pytest.mark.parametrize("law", [LogitNormal, ScaledBeta])
 def test_an_untrained_actor_executes_what_is_asked(law: type, std: float) -> None:
     torch.manual_seed(0)
@@ -122,5 +122,7 @@ def test_an_untrained_actor_executes_what_is_asked(law: type, std: float) -> Non
 def test_what_cannot_be_started_is_refused() -> None:
     with pytest.raises(ValueError, match=r"std=0\.6 is out of reach"):
         quiet_actor(nn.Identity(), 2, ScaledBeta, LOW, HIGH, 0.6)
+    with pytest.raises(ValueError, match=r"std=0\.004 is out of reach"):
+        quiet_actor(nn.Identity(), 2, LogitNormal, LOW, HIGH, 0.004)
     with pytest.raises(ValueError, match="quiet_actor knows the laws"):
         quiet_actor(nn.Identity(), 2, torch.distributions.Normal, LOW, HIGH)  # type: ignore[arg-type]

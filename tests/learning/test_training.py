@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from gymnasium.wrappers.vector import NormalizeReward
 
 from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, train
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.whole_files import DamagedFileError, held
+from inbounds.learning.training import prepare
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 
@@ -105,6 +107,18 @@ def test_on_robots_too(tmp_path: Path) -> None:
     resumed = train(config, run_dir=tmp_path)
     assert torch.equal(weights(whole), weights(resumed))
     assert same_records(whole.records, resumed.records)
+
+
+def test_what_a_wrapper_has_gathered_is_not_mixed_with_the_robots_state(tmp_path: Path) -> None:
+    """A resumed run with a wrapper starts new episodes, as it says, and does not go on with half of the state."""
+    config = small_config(epochs=4)
+
+    def wrapped(n: int) -> Any:
+        return NormalizeReward(PointEnv(n))
+
+    train(dataclasses.replace(config, epochs=2), run_dir=tmp_path, make_envs=wrapped)
+    assert checkpoint.load(tmp_path / checkpoint.FILE_NAME)["collector"]["envs"] is None
+    assert len(train(config, run_dir=tmp_path, make_envs=wrapped).records) == 4
 
 
 def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:
@@ -242,6 +256,45 @@ def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> Non
         train(other, run_dir=tmp_path, make_envs=PointEnv)
 
 
+@pytest.mark.parametrize(
+    ("low", "said"), [((-1.0, -0.5), "action bounds are not those"), ((-1.0,) * 3, "have another size")]
+)
+def test_a_checkpoint_of_another_environment_is_refused(
+    low: tuple[float, ...], said: str, tmp_path: Path
+) -> None:
+    config = small_config(epochs=1)
+    train(config, run_dir=tmp_path, make_envs=PointEnv)
+    before = (tmp_path / checkpoint.FILE_NAME).read_bytes()
+    with pytest.raises(ValueError, match=said):
+        train(
+            dataclasses.replace(config, epochs=2),
+            run_dir=tmp_path,
+            make_envs=lambda n: PointEnv(n, low, (1.0,) * len(low)),
+        )
+    assert (tmp_path / checkpoint.FILE_NAME).read_bytes() == before
+
+
+def test_a_checkpoint_that_may_not_be_read_is_not_called_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The tests may run as root, whom no permission stops: the file system's answer is made up."""
+    config = small_config(epochs=1)
+    train(config, run_dir=tmp_path, make_envs=PointEnv)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(checkpoint.zipfile, "ZipFile", refuse)
+    with pytest.raises(PermissionError):
+        train(config, run_dir=tmp_path, make_envs=PointEnv)
+
+
+def test_a_minibatch_of_one_can_be_prepared() -> None:
+    config = dataclasses.replace(small_config("trpo"), engine="compiled")
+    algorithm = dataclasses.replace(config.algorithm, minibatch_size=1)
+    assert prepare(dataclasses.replace(config, algorithm=algorithm), PointEnv) > 0
+
+
 # ---- records, divergence, configuration
 
 
@@ -308,6 +361,7 @@ def test_presets_are_the_table() -> None:
         (lambda: preset("common", policy="normal"), "choose one of gaussian"),
         (lambda: TrainConfig(seeds=()), "seeds must be different"),
         (lambda: TrainConfig(seeds=(1, 1)), "seeds must be different"),
+        (lambda: TrainConfig(seeds=(1, 2**63)), "integers below 2⁶³"),
         (lambda: TrainConfig(epochs=0), "epochs must be positive"),
         (lambda: TrainConfig(action_mode="clipped"), "clip or raw"),
     ],

@@ -358,3 +358,10 @@ def test_the_tables_cover_every_action_and_observation(name):
             covered += range(int(first), int(last or first) + 1)
         assert covered == list(range(size))
     assert f"{envs.dt:g} s" in TASKS[name].__doc__
+
+
+def test_seeds_may_be_numpys() -> None:
+    envs = make("Swimmer-v5", 2)
+    expected = envs.reset(seed=3)[0]
+    assert np.array_equal(envs.reset(seed=np.int64(3))[0], expected)
+    assert np.array_equal(envs.reset(seed=list(np.array([3, 4])))[0], expected)

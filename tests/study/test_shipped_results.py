@@ -109,6 +109,7 @@ def test_the_evaluations_repeat_the_returns_of_the_final_policies() -> None:
         here = read_metadata(evaluation_file(RESULTS, cell))["session"]["processor"]
         if (
             EPISODES[cell.robot] < 10
+            or len(cell.kept_seeds) < len(cell.seeds)  # played in another batch: to rounding only
             or read_metadata(RESULTS.cell_file(cell))["sessions"][-1]["processor"] != here
         ):
             continue

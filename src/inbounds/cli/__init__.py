@@ -101,7 +101,7 @@ def _run(args: list[str]) -> int:
     except SystemExit as exit_:  # tyro has written its help, or what is wrong
         if is_unread(exit_):
             raise
-        if exit_.code == 0:
+        if exit_.code == 0 and args[:2] != ["study", "dial"]:  # which has examples of its own
             examples = EXAMPLES.get(next(iter(args), ""), "\n".join(EXAMPLES.values()))
             print(f"\nexamples:\n{examples}")
         return exit_.code if isinstance(exit_.code, int) else 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -193,6 +194,11 @@ def study(args: Sequence[str]) -> int:
         return _complain(str(error), 2)
     except StudyError as error:
         return _complain(str(error), 1)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
+            raise
+        said = f"{error}. What was finished is kept: make room, or choose other folders (--results, --work)"
+        return _complain(said, 1)
 
 
 def _run(command: Run, cells: Sequence[Cell], console: Console) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
+import errno
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -76,7 +78,7 @@ def run(command: Train) -> int:
     """
     config, run_dir = command.train_config(), command.run_dir()
     _check_environment(config)
-    room = next(path for path in (run_dir, *run_dir.absolute().parents) if path.exists())
+    room = next(path for path in (run_dir, *run_dir.absolute().parents) if os.path.exists(path))
     with _claimed(run_dir):
         return _Session(command, config, run_dir, room).run()
 
@@ -232,6 +234,10 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
         state = load_checkpoint(run_dir)
     except DamagedFileError as error:
         raise CommandError(str(error)) from error
+    except PermissionError as error:
+        raise CommandError(
+            f"{run_dir}: its checkpoint cannot be read ({error.strerror}): change its permissions"
+        ) from error
     if changes := _changes(config, state["config"]):
         raise CommandError(
             f"{run_dir} is the run of another configuration ({changes}): choose another --out, or ask for that one",
@@ -245,15 +251,17 @@ def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
     different = changed_fields(config, stored, FREE_TO_CHANGE)
     if "algorithm_name" in different:  # another algorithm has other options, too
         different = {"algo": different["algorithm_name"]}
+    spelt = {"policy.family": "--policy", "env": "environment"}  # the others as they are called
     return "; ".join(
-        f"--{name.replace('_', '-')} {there} there, {here} here" for name, (there, here) in different.items()
+        f"{spelt.get(name, '--' + name.replace('_', '-'))} {there} there, {here} here"
+        for name, (there, here) in different.items()
     )
 
 
 @contextlib.contextmanager
 def _claimed(run_dir: Path) -> Iterator[None]:
     """Make the run directory and hold it, so that no second process trains in it at the same time."""
-    new = [path for path in (run_dir, *run_dir.parents) if not path.exists()]
+    new = [path for path in (run_dir, *run_dir.parents) if not os.path.exists(path)]
     with contextlib.ExitStack() as stack:
         stack.callback(_remove_empty, new)
         try:
@@ -264,6 +272,8 @@ def _claimed(run_dir: Path) -> Iterator[None]:
                 f"another process trains in {run_dir}: wait until it is done, or choose another --out"
             ) from error
         except OSError as error:
+            if error.errno == errno.ENAMETOOLONG:
+                raise
             said = "no room on the disk" if is_disk_full(error) else error.strerror
             raise CommandError(
                 f"{run_dir} cannot be a run directory ({said}): choose another --out"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def run(command: Watch) -> int:
 
     try:
         require_encoder()  # before the film is made, not after
-        envs = RecordEpisodeStatistics(make_environments(policy.config, 1))
+        envs = RecordEpisodeStatistics(make_environments(policy.config, 1), buffer_length=sys.maxsize)
         film = robots.record(
             envs,
             act,
@@ -110,6 +111,10 @@ def _choose(command: Watch) -> TrainedPolicy:
         raise CommandError(f"there is no trained run in {command.run}: {instead}") from None
     except ValueError as error:  # damaged, or of another version
         raise CommandError(str(error)) from error
+    except PermissionError as error:
+        raise CommandError(
+            f"{command.run} cannot be read ({error.strerror}): change its permissions"
+        ) from error
     healthy = [str(i) for i, policy in enumerate(policies) if not policy.diverged]
     if not 0 <= command.seed_index < len(policies):
         raise CommandError(

@@ -199,7 +199,8 @@ class SigmoidMapped(BoundedDistribution):
 def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
     """Return the parameters as tensors of one floating type, one device and one shape.
 
-    The type is that of the law's own tensors (the bounds are cast to it; numbers adapt), or torch's default.
+    The type is that of the law's own tensors (the bounds are cast to it; numbers adapt), else that of the bounds where
+    they are tensors or arrays, or torch's default.
 
     Args:
         **parameters: numbers, tensors or arrays that broadcast together.
@@ -217,8 +218,11 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
         ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
     """
     given = {
-        # A tuple of types: torch.compile cannot trace a union.
-        name: torch.tensor(value) if isinstance(value, (np.ndarray, np.generic)) else value
+        name: torch.tensor(value)
+        if isinstance(value, np.ndarray)
+        else value.item()  # a number, which adapts
+        if isinstance(value, np.generic)
+        else value
         for name, value in parameters.items()
     }
     own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]
@@ -256,8 +260,11 @@ def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
         Traceback (most recent call last):
         ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. An unbounded ...
     """
-    tensors = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in (low, high))
-    low, high = as_parameters(low=next(tensors), high=next(tensors)).values()
+    own = (
+        b.detach().clone() if isinstance(b, Tensor) else np.array(b) for b in (low, high)
+    )  # not the caller's memory
+    low, high = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in own)
+    low, high = as_parameters(low=low, high=high).values()
     _check_bounds("action box", low, high)
     return low, high
 
@@ -265,7 +272,7 @@ def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
 def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None:
     """Raise unless p and q live on the same interval: otherwise their KL divergence is infinite or meaningless.
 
-    Not in compiled code (`torch.compile`), where nothing can be checked.
+    Not in compiled code (`torch.compile`), where nothing can be checked, and not where both were made without checks.
 
     Args:
         p: a law with bounds.
@@ -274,8 +281,8 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
     Raises:
         ValueError: the bounds differ anywhere.
     """
-    if torch.compiler.is_compiling():  # which cannot branch on numbers
-        return
+    if torch.compiler.is_compiling() or not (p._validate_args or q._validate_args):
+        return  # compiled code cannot branch on numbers, nor can torch.vmap
     if bool(((p.low != q.low) | (p.high != q.high)).any()):
         raise ValueError(
             "the KL divergence needs equal bounds, but "

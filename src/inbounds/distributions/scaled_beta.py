@@ -119,11 +119,13 @@ class ScaledBeta(SigmoidMapped):
         low, high = given["low"], given["high"]
         towards_high, towards_low = given["mode"] - low, high - given["mode"]
         if validate_args if validate_args is not None else cls._validate_args:
-            if not bool(((towards_high >= 0) & (towards_low >= 0)).all()):
+            if not torch._is_all_true(
+                (towards_high >= 0) & (towards_low >= 0)
+            ):  # as torch checks, also under vmap
                 raise ValueError(
                     f"the mode must lie within [low, high], got {mode}: clip it or move the bounds"
                 )
-            if not bool((given["concentration"] >= 0).all()):
+            if not torch._is_all_true(given["concentration"] >= 0):
                 raise ValueError(
                     f"the concentration must not be negative, got {concentration}: use softplus or exp on what feeds it"
                 )
@@ -208,8 +210,9 @@ class ScaledBeta(SigmoidMapped):
         """
         alpha, beta = self.concentration1, self.concentration0
         no_pole = (alpha >= 1) & (beta >= 1)
-        peaked = no_pole & (alpha + beta > 2)
-        inside = (alpha - 1) / torch.where(peaked, alpha + beta - 2, torch.ones_like(alpha))
+        excess = (alpha - 1) + (beta - 1)  # not α + β − 2, which rounds where both are near one
+        peaked = no_pole & (excess > 0)
+        inside = (alpha - 1) / torch.where(peaked, excess, torch.ones_like(alpha))
         at_bound = ((beta < 1) & (beta <= alpha)).to(alpha.dtype)
         fraction = torch.where(peaked, inside, torch.where(no_pole, torch.full_like(alpha, 0.5), at_bound))
         return torch.where(

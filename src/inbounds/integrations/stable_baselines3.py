@@ -172,7 +172,7 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
             f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
         )
     box: Any = model.action_space
-    low, high = require_bounds(box.low, box.high)
+    low, high = require_bounds(box.low.reshape(-1), box.high.reshape(-1))
     with torch.no_grad():
         if kind is LogitNormalDistribution:
             policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))

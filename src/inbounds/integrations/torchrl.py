@@ -7,7 +7,7 @@ environment:
 
     actor, acting = bounded_actor(network, LogitNormal, low, high)
     loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
-    batch = env.rollout(1000, acting)       # writes both, and "action"
+    batch = env.rollout(1000, acting)       # draws, writes both, and "action"
 
 `quiet_actor` makes the two with a quiet start: centred in the box, with as much executed noise as is asked for.
 
@@ -18,6 +18,7 @@ switches them on again.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -33,6 +34,7 @@ from inbounds.integrations.quiet import quiet_scale
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
+    from torchrl.envs.utils import ExplorationType
     from torchrl.modules import NormalParamExtractor, ProbabilisticActor
 except ImportError as error:
     raise ImportError('TorchRL is not installed: pip install ".[integrations]" in the source tree') from error
@@ -43,6 +45,10 @@ PARAMETERS: Mapping[type[LogitNormal | ScaledBeta], tuple[str, str]] = MappingPr
     {LogitNormal: ("loc", "scale"), ScaledBeta: ("concentration1", "concentration0")}
 )
 """The two parameters `[..., A]` that a network must give for each law, in order."""
+
+
+LEAST_SCALE = 0.0101
+"""Of what TorchRL's `NormalParamExtractor` can give a little more than the least."""
 
 
 class Latents(Distribution):
@@ -81,6 +87,15 @@ class Latents(Distribution):
         return self.law.entropy().sum(-1)
 
     @property
+    def mean(self) -> Tensor:
+        """What `ExplorationType.MEAN` would ask for, in vain: TorchRL would map a mean of latents, which is no mean.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError("a mean of latents is no mean of actions: use ExplorationType.DETERMINISTIC")
+
+    @property
     def deterministic_sample(self) -> Tensor:
         """`[..., A]` the latents of a logit-normal's median, or of a Beta's mean: TorchRL's deterministic action."""
         law = self.law
@@ -113,7 +128,8 @@ def bounded_actor(
 
     Returns:
         The actor, which writes the parameters, `latent` `[..., A]` and `latent_log_prob` `[...]`: give it to a loss.
-        And the same followed by the module that writes `action` `[..., A]`: let it act.
+        And the same followed by the module that writes `action` `[..., A]`: let it act. Both draw, unless
+        `set_exploration_type` says otherwise (TorchRL's own actors act without noise then).
 
     Raises:
         ValueError: another law, or bounds that are not finite, not in order, or too close for a number between them.
@@ -132,25 +148,30 @@ def bounded_actor(
     low, high = require_bounds(low, high)  # once: TorchRL switches off every later check
     names = PARAMETERS[law]
 
-    def latents(**parameters: Tensor) -> Latents:
-        return Latents(law(**parameters, low=low, high=high, validate_args=False))
-
-    def action(latent: Tensor) -> Tensor:
-        """Any law with these bounds has the same map."""
-        ones = torch.ones_like(latent)
-        return law(ones, ones, low.to(latent), high.to(latent), validate_args=False).latent_to_value(latent)
-
     actor = ProbabilisticActor(
         TensorDictModule(network, in_keys=list(in_keys), out_keys=list(names)),
         in_keys=list(names),
         out_keys=["latent"],
-        distribution_class=latents,
+        distribution_class=_latents,
+        distribution_kwargs={"law": law, "low": low, "high": high},
         return_log_prob=True,
         log_prob_key="latent_log_prob",
+        default_interaction_type=ExplorationType.RANDOM,
     )
+    execute = functools.partial(_action, law=law, low=low, high=high)
     return actor, TensorDictSequential(
-        actor, TensorDictModule(action, in_keys=["latent"], out_keys=["action"])
+        actor, TensorDictModule(execute, in_keys=["latent"], out_keys=["action"])
     )
+
+
+def _latents(law: type[LogitNormal | ScaledBeta], low: Tensor, high: Tensor, **parameters: Tensor) -> Latents:
+    return Latents(law(**parameters, low=low, high=high, validate_args=False))
+
+
+def _action(latent: Tensor, law: type[LogitNormal | ScaledBeta], low: Tensor, high: Tensor) -> Tensor:
+    """Any law with these bounds has the same map."""
+    ones = torch.ones_like(latent)
+    return law(ones, ones, low.to(latent), high.to(latent), validate_args=False).latent_to_value(latent)
 
 
 class _BetaHead(nn.Module):
@@ -158,7 +179,8 @@ class _BetaHead(nn.Module):
 
     def __init__(self, start: float) -> None:
         super().__init__()
-        self.shift = math.log(math.expm1(start - 1))
+        excess = start - 1
+        self.shift = excess + math.log(-math.expm1(-excess))  # the softplus' inverse, without overflow
 
     def forward(self, outputs: Tensor) -> tuple[Tensor, ...]:
         return tuple((1 + nn.functional.softplus(outputs + self.shift)).chunk(2, dim=-1))
@@ -213,7 +235,12 @@ def quiet_actor(
             (std**-2 - 1) / 2
         )  # the standard deviation is 1/√(2α + 1) of half the range
     else:
-        head = NormalParamExtractor(scale_mapping=f"biased_softplus_{quiet_scale(LogitNormal, std)}")
+        scale = quiet_scale(LogitNormal, std)
+        if scale < LEAST_SCALE:
+            raise ValueError(
+                f"std={std} is out of reach: TorchRL's biased_softplus keeps σ above {LEAST_SCALE}"
+            )
+        head = NormalParamExtractor(scale_mapping=f"biased_softplus_{scale}")
     last = nn.Linear(features, 2 * require_bounds(low, high)[0].numel())
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.zeros_(last.bias)

@@ -64,9 +64,13 @@ class TrainConfig:
     def __post_init__(self) -> None:
         object.__setattr__(self, "seeds", tuple(map(operator.index, self.seeds)))  # NumPy's integers, too
         check(self, positive=("epochs", "checkpoint_every"))
-        if not self.seeds or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
+        if (
+            not self.seeds
+            or len(set(self.seeds)) < len(self.seeds)
+            or not 0 <= min(self.seeds) <= max(self.seeds) < 2**63
+        ):
             raise ValueError(
-                f"seeds must be different, non-negative integers, at least one; got {self.seeds}"
+                f"seeds must be different, non-negative integers below 2⁶³, at least one; got {self.seeds}"
             )
         if self.engine not in ("autograd", "compiled"):
             raise ValueError(f"engine must be autograd or compiled, got {self.engine!r}")

@@ -248,8 +248,11 @@ class Collector:
         return type(parameters[0])(*together), torch.cat(log_prob), torch.cat(value)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that the future depends on; physics included, if the environments have `get_state`."""
-        get_state = getattr(self.envs.unwrapped, "get_state", None)
+        """Return everything that the future depends on; physics included, if the environments have `get_state`.
+
+        A wrapper hides the state of what it wraps, since its own would be lost: it may have a `get_state` for both.
+        """
+        get_state = getattr(self.envs, "get_state", None)
         return {
             "envs": get_state() if get_state is not None else None,
             "obs": self.obs.copy(),
@@ -266,8 +269,8 @@ class Collector:
         if state["envs"] is None:
             self.restart()  # its first observations are seen with the statistics that have just been loaded
         else:
-            unwrapped: Any = self.envs.unwrapped
-            unwrapped.set_state(state["envs"])
+            envs: Any = self.envs if hasattr(self.envs, "set_state") else self.envs.unwrapped
+            envs.set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
 
 

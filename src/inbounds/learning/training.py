@@ -193,6 +193,7 @@ class Trainer:
         """Return everything that the future depends on, and the records so far; later epochs leave it as it is."""
         return {
             "config": describe(self.config),
+            "box": self._box(),
             "networks": self.networks.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "collector": self.collector.state_dict(),
@@ -205,7 +206,8 @@ class Trainer:
         """Go back to a state from `state_dict` of a run with the same configuration.
 
         Raises:
-            ValueError: another configuration wrote it; more epochs than planned then are allowed.
+            ValueError: another configuration wrote it (more epochs than planned then are allowed), or the environment
+                has other observations or actions than it had.
         """
         if different := changed_fields(self.config, state["config"], FREE_TO_CHANGE):
             changes = "; ".join(f"{name}: {stored} → {ours}" for name, (stored, ours) in different.items())
@@ -213,12 +215,28 @@ class Trainer:
                 f"the checkpoint belongs to another configuration ({changes}): "
                 "use that one, or another run directory"
             )
+        self._require_same_spaces(state)
         self.networks.load_state_dict(state["networks"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.collector.load_state_dict(state["collector"])
         restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
         self.records = list(state["records"])
         self.diverged = state["diverged"].copy()
+
+    def _box(self) -> list[np.ndarray]:
+        box: Any = self.envs.single_action_space
+        return [box.low.copy(), box.high.copy()]
+
+    def _require_same_spaces(self, state: dict[str, Any]) -> None:
+        """Raise if the environment's spaces are not those that the run began with."""
+        remedy = "use the environment that the run began with, or another run directory"
+        for name, net in zip(("actor", "critic"), self.networks.networks, strict=True):
+            if state["networks"][name].shape != net.theta.shape:
+                raise ValueError(
+                    f"the environment's observations or actions have another size than they had: {remedy}"
+                )
+        if "box" in state and not all(map(np.array_equal, state["box"], self._box())):
+            raise ValueError(f"the environment's action bounds are not those that they were: {remedy}")
 
 
 def train(
@@ -231,7 +249,8 @@ def train(
     """Train to the last epoch, going on from the run directory's checkpoint if there is one.
 
     A resumed run is, bit for bit, the run that was never interrupted, if the environments can save their state
-    (`get_state`, `set_state`, as those of `inbounds.robots`); others start new episodes where the run resumes.
+    (`get_state`, `set_state`, as those of `inbounds.robots`); others start new episodes where the run resumes. So do
+    wrapped ones: what a wrapper has gathered, such as the statistics of `NormalizeReward`, is not kept.
 
     Args:
         config: what to do.
@@ -298,7 +317,9 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
     """
     start = time.perf_counter()
     if config.engine == "compiled":
-        short = dataclasses.replace(config.algorithm, horizon=config.algorithm.minibatch_size, num_epochs=1)
+        short = dataclasses.replace(
+            config.algorithm, horizon=max(2, config.algorithm.minibatch_size), num_epochs=1
+        )
         trainer = Trainer(dataclasses.replace(config, seeds=config.seeds[:1], algorithm=short), make_envs)
         trainer.epoch()
         trainer.envs.close()

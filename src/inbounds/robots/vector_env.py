@@ -127,8 +127,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         Raises:
             ValueError: the number of seeds, or the mask, does not fit.
         """
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
-        seeds = [None] * self.num_envs if seeds is None else list(seeds)
+        seeds = [int(seed) + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
+        seeds = [None] * self.num_envs if seeds is None else [None if s is None else int(s) for s in seeds]
         if len(seeds) != self.num_envs:
             raise ValueError(
                 f"Pass one seed for each of the {self.num_envs} robots, or one integer; got {len(seeds)}"

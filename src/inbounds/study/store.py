@@ -168,9 +168,12 @@ class StudyFolder:
             sums = self.checksums() | new
             lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
             write_whole(self.results / CHECKSUMS_FILE, lines.encode())
-        for path, data in contents.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, data)
+            for (
+                path,
+                data,
+            ) in contents.items():  # below the lock: of two writers of a file the last one's sum holds
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_whole(path, data)
 
     def _name(self, path: Path) -> str:
         return path.relative_to(self.results).as_posix()

@@ -201,12 +201,17 @@ def summary(actions: NDArray[Any], length: int) -> dict[str, float]:
         actions: `[T, A]` executed, in units of half the range.
         length: env steps of the episode, at most T; what comes after is another episode's.
 
+    Returns:
+        Numbers; NaN where the policy gave some.
+
     Example:
         >>> found = summary(np.array([[1.0], [-1.0], [0.2], [9.0]]), length=3)
         >>> round(found["at_bounds"], 2), found["reversals"], found["abs_q50"]
         (0.67, 1.0, 1.0)
     """
     mine = actions[:length]
+    if not np.isfinite(mine).all():  # of a diverged seed
+        return dict.fromkeys([*(f"abs_q{q:02}" for q in QUANTILES), "at_bounds", "reversals"], float("nan"))
     size = np.abs(mine)
     quantiles = np.quantile(size, np.array(QUANTILES) / 100)
     signs = np.sign(mine)

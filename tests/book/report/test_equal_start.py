@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inbounds.book.report import answers
+from inbounds.book.report import answers, winners
 from inbounds.book.report.equal_start import Evidence, grade, laws, outcomes_of_both, quiet_starts
 from inbounds.study.grid import AFTERWARDS, SECOND, select
 from inbounds.study.outcomes import Outcomes
@@ -57,6 +57,15 @@ def test_grades_of_the_first_study(changed: dict, word: str) -> None:
 )
 def test_grades_of_the_second_study(changed: dict, word: str) -> None:
     assert grade(dataclasses.replace(SECOND_ONE, **changed)) == word
+
+
+def test_what_is_too_small_to_matter_is_not_called_no_difference() -> None:
+    small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
+    assert answers.counted([SECOND_ONE, small]) == (
+        "above on 1 of 2 robots, below on 0, too small to matter on 1, no difference found on 0"
+    )
+    assert winners.field([small]) == "too small to matter, with fresh seeds; logit-normal not run"
+    assert "too small to matter" in answers.graded([small])
 
 
 @pytest.fixture

@@ -87,4 +87,5 @@ def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> N
         "σ free or of the state",
         "the bounded laws",
     }
-    assert {row[4] for row in rows} <= {"higher", "lower", "unresolved", "not after Holm"}
+    assert {row[4] for row in rows} <= {"higher", "lower", "unresolved", "not after Holm", "waits for seeds"}
+    assert all((row[4] == "waits for seeds") == (row[5] == "") for row in rows)

@@ -1,5 +1,6 @@
 """The chapters' views of the study: the report's own parts, the same stored text with cells and without."""
 
+import dataclasses
 from collections import Counter
 from html import unescape
 from pathlib import Path
@@ -188,6 +189,12 @@ def test_the_middle_seed_is_in_the_middle(some: Outcomes) -> None:
     middle = returns[study_pages.middle_seed(outcome)]
     assert np.sum(returns < middle) == 4
     assert np.sum(returns > middle) == 5
+
+
+def test_the_middle_seed_is_one_whose_policy_is_kept(some: Outcomes) -> None:
+    outcome = some.finished["standard-hopper-ppo-beta"]
+    three = dataclasses.replace(outcome.cell, keeps_seeds=outcome.cell.seeds[:3])
+    assert study_pages.middle_seed(dataclasses.replace(outcome, cell=three)) in range(3)
 
 
 def test_films_that_cannot_be_shown_are_called_missing(nothing: Outcomes) -> None:

@@ -49,5 +49,10 @@ def test_the_files_rows_are_the_policies(tmp_path: Path) -> None:
     assert (kinds["latent, float32"]["worst"] == 0).all()  # a policy in float32 draws latents in float32
     assert (kinds["action, bfloat16"]["wrong"] > kinds["action, float16"]["wrong"]).all()
     rows = [row for row in records_of(cell, folder) if row["record"] == "action, bfloat16"]
+    again = folder.policy_files(cell)[0]
+    again.write_bytes(folder.policy_files(other)[0].read_bytes())
+    assert publish_records([cell, other], folder)  # whose policies have been replaced
+    assert not publish_records([cell, other], folder)
+    assert read_records(folder).keys() == {cell.id, other.id}
     assert [row["wrong"] for row in rows] == kinds["action, bfloat16"]["wrong"].tolist()
     assert [row["steps"] for row in rows] == [40, 40]

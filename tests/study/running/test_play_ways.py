@@ -133,6 +133,7 @@ def test_what_describes_actions() -> None:
     assert found["reversals"] == 0.75  # of four changes the second component's first is none
     assert (found["abs_q05"], found["abs_q50"], found["abs_q95"]) == (0.5, 0.75, 1.0)
     assert summary(actions, 1)["reversals"] == 0
+    assert all(np.isnan(value) for value in summary(np.full((3, 2), np.nan), 3).values())
     assert ways_of("clipped-gaussian") == ("mean", "median", "sample", "median-snapped", "sample-snapped")
 
 

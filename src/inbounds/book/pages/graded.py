@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 _CALL = re.compile(r"\bgraders\.(\w+)\(")
+_SHOWN = re.compile(r"^graders\.(\w+)\(", re.M)
 _START = re.compile(r"^(?:`{3,}|:{3,})\{exercise-start\}.*\n(?::(?!label)\w+:.*\n)*:label:[ \t]*(\S+)", re.M)
 
 
@@ -18,6 +19,19 @@ def graders_in(source: str) -> list[str]:
         ['loss', 'update']
     """
     return _CALL.findall(source)
+
+
+def grader_shown(source: str) -> str | None:
+    r"""Return the grader whose judgement a cell shows: the last one that is called at the beginning of a line.
+
+    Example:
+        >>> grader_shown("print(graders.loss(wrong).message)\ngraders.update(my_update)")
+        'update'
+        >>> grader_shown("print(graders.loss(wrong).message)") is None
+        True
+    """
+    found = _SHOWN.findall(source)
+    return found[-1] if found else None
 
 
 def graders_of(notebook: Path) -> dict[str, list[str]]:

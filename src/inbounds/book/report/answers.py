@@ -22,9 +22,14 @@ from inbounds.study.words import spoken
 
 def sign(row: Evidence) -> int:
     """Return 1 where the difference is above 0, however well that is founded, −1 below, 0 where neither is shown."""
-    if grade(row) in ("too small to matter, with fresh seeds", "no difference found"):
+    if too_small(row) or grade(row) == "no difference found":
         return 0
     return 1 if row.difference.value > 0 else -1
+
+
+def too_small(row: Evidence) -> bool:
+    """Return whether the second study's rule says that a difference, if there is one, is too small to choose by."""
+    return grade(row) == "too small to matter, with fresh seeds"
 
 
 def first_choice(rows: Sequence[Evidence]) -> str:
@@ -69,9 +74,13 @@ def counted(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    counts = Counter(map(sign, rows))
+    counts, small = Counter(map(sign, rows)), sum(map(too_small, rows))
     robots = f"{len(rows)} robot{'' if len(rows) == 1 else 's'}"
-    return f"above on {counts[1]} of {robots}, below on {counts[-1]}, no difference found on {counts[0]}"
+    refuted = f", too small to matter on {small}" if small else ""
+    return (
+        f"above on {counts[1]} of {robots}, below on {counts[-1]}{refuted}, "
+        f"no difference found on {counts[0] - small}"
+    )
 
 
 def short(rows: Sequence[Evidence]) -> str:
@@ -85,7 +94,7 @@ def short(rows: Sequence[Evidence]) -> str:
 
 
 def graded(rows: Sequence[Evidence]) -> str:
-    """Return how well the differences are founded that leave out 0; the best grade first.
+    """Return how well the differences are founded that are found or suggested, or refuted; the best grade first.
 
     Example:
         >>> graded([])

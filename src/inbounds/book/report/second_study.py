@@ -8,15 +8,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from inbounds.book.report import html
 from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
+from inbounds.book.report.study_panels import left_out
 from inbounds.book.report.words import HEADS
 from inbounds.study.grid import FREE, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
     GAUSSIAN,
+    MARGINS,
     PrimaryRow,
     aggregate,
     engines_agree,
@@ -27,6 +31,7 @@ from inbounds.study.second import (
 )
 from inbounds.study.second.primary import BOUNDED
 from inbounds.study.second.yardsticks import ENDPOINTS
+from inbounds.study.statistics import Estimate
 from inbounds.study.words import p_value, percent, spoken, verdict
 
 BLOCKS = {
@@ -89,7 +94,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             f"±{row.margin:g}",
             p_value(row.p_value),
             p_value(row.p_adjusted),
-            str(row.difference.n) if row.difference else "",
+            _seeds(row.difference),
         ]
         for row in rows
     ]
@@ -104,7 +109,37 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
         ),
         html.table(caption, head, table, words=(0, 1, 2, 4)),
+        *_without_diverged(_second(outcomes)),
     )
+
+
+def _seeds(difference: Estimate | None) -> str:
+    """Return how many seeds of a side count, and how many diverged or are left out."""
+    return (left_out(difference) or str(difference.n)) if difference else ""
+
+
+def _without_diverged(outcomes: Outcomes) -> Iterator[str]:
+    """Yield the primary findings without diverged seeds, if any seed diverged; those that count are with them."""
+    with_them = {(r.law, r.endpoint, r.robot): r for r in primary(outcomes)}
+    if not any(row.difference is not None and row.difference.diverged for row in with_them.values()):
+        return
+    table = [
+        [
+            row.robot,
+            SHORT[row.law],
+            HEADS[row.endpoint],
+            spoken(row.difference),
+            row.finding or "waits for seeds",
+            with_them[row.law, row.endpoint, row.robot].finding or "waits for seeds",
+        ]
+        for row in primary(outcomes, without_diverged=True)
+        if row.difference is not None
+    ]
+    caption = (
+        "The primary comparison without the seeds that diverged. The findings that count are those with them."
+    )
+    head = ["robot", "law", "endpoint", "difference", "finding", "with them"]
+    yield html.table(caption, head, table, words=(0, 1, 2, 4, 5))
 
 
 def _bars(rows: Sequence[PrimaryRow]) -> dict[str, list[Bar]]:
@@ -125,9 +160,8 @@ def over_robots(outcomes: Outcomes) -> Shown:
     for law in ("gaussian", *BOUNDED):
         column = GAUSSIAN if law == "gaussian" else Column("equal", "ppo", law)
         for endpoint, name in ENDPOINTS.items():
-            iqm, better = aggregate(found, column, endpoint), improvement(found, column, endpoint)
-            if iqm is not None:
-                beats = "" if law == "gaussian" else spoken(better, 2)
+            if (iqm := aggregate(found, column, endpoint)) is not None:
+                beats = "" if law == "gaussian" else spoken(improvement(found, column, endpoint), 2)
                 rows.append([column_name(column), name, spoken(iqm, 2), beats])
     if not rows:
         missing = html.missing("missing: no primary column is complete on all six robots.")
@@ -173,7 +207,7 @@ def secondary_comparisons(outcomes: Outcomes) -> Shown:
             row.robot,
             HEADS[row.endpoint],
             spoken(row.comparison.difference),
-            verdict(row.comparison),
+            verdict(row.comparison) if np.isfinite(row.comparison.p_value) else "waits for seeds",
             p_value(row.comparison.p_adjusted),
             p_value(row.p_over_everything),
             row.question,
@@ -190,16 +224,24 @@ def secondary_comparisons(outcomes: Outcomes) -> Shown:
 
 def engine_check(outcomes: Outcomes) -> Shown:
     """Return whether the compiled engine's cells are equivalent to their twins of the first study."""
-    agreed = engines_agree(_second(outcomes))
+    agreed, wider = engines_agree(_second(outcomes)), engines_agree(_second(outcomes), level=0.025)
     if not agreed:
         return html.of_study("the two engines", NONE_FINISHED)
+
+    def found(key: tuple[str, str, str]) -> str:
+        """The protocol stops the study where the whole 95 % interval lies outside the margin."""
+        _, robot, endpoint = key
+        margin = MARGINS[endpoint][robot]
+        outside = wider[key].low > margin or wider[key].high < -margin
+        return "equivalent" if agreed[key].equivalent else "outside the margin" if outside else "undecided"
+
     rows = [
         [
             robot,
             SHORT[family],
             HEADS[endpoint],
             f"{e.difference:.0f} [{e.low:.0f}, {e.high:.0f}]".replace("-", "−"),
-            "equivalent" if e.equivalent else "undecided",
+            found((family, robot, endpoint)),
             p_value(e.p_value),
         ]
         for (family, robot, endpoint), e in agreed.items()

@@ -108,8 +108,8 @@ def _side_by_side(
 
 
 def middle_seed(outcome: Outcome) -> int:
-    """Return the place of the seed whose final policy, acting by the median, has the middle return."""
-    returns = outcome.ways["median"]
+    """Return the place of the seed whose policy, of those that are kept, has the middle return by the median."""
+    returns = outcome.ways["median"][: len(outcome.cell.kept_seeds)]  # which are the first
     return int(np.argsort(returns, kind="stable")[(np.isfinite(returns).sum() - 1) // 2])
 
 

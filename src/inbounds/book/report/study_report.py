@@ -21,17 +21,24 @@ from inbounds.book.report.words import ALGORITHMS, ARM_NAMES, ARM_TITLES, title_
 from inbounds.learning.storage.whole_files import write_whole
 from inbounds.study.grid import ARMS, ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
-from inbounds.study.statistics.settings import CURVE_RESAMPLES, LEVEL, MANY_RESAMPLES
+from inbounds.study.statistics.settings import (
+    CURVE_RESAMPLES,
+    LEVEL,
+    MANY_RESAMPLES,
+    PROFILE_RESAMPLES,
+    RESAMPLES,
+)
 from inbounds.study.words import percent
 
 HOW_TO_READ = (
     "A cell is one algorithm × family × variant × robot, ten seeds. The unit of analysis is the seed: n counts seeds.",
     f"Bars and bands are {percent(LEVEL)} intervals over seeds: expanded percentile bootstrap, {MANY_RESAMPLES} "
     f"resamples, {CURVE_RESAMPLES} for a curve. A curve's band holds at each epoch by itself, and over all robots the "
-    "plain percentile interval is taken. They say what other seeds would have given, nothing about other robots.",
-    "Differences are between families within an algorithm. p-values are of permutation tests, corrected over the six "
-    "robots (Holm). An interval that contains 0 is unresolved: ten seeds a side find differences of about 1.3 standard "
-    "deviations.",
+    f"plain percentile interval is taken (first study: {RESAMPLES} resamples, {PROFILE_RESAMPLES} for a profile). They "
+    "say what other seeds would have given, nothing about other robots.",
+    "Differences are between families within an algorithm. p-values are of permutation tests, in the first study "
+    "corrected over the six robots (Holm). An interval that contains 0 is unresolved: ten seeds a side find "
+    "differences of about 1.3 standard deviations.",
     "Only whole cells count. One that is not finished is called missing, wherever it belongs.",
     "Final return, area and test were fixed before the first run, in results/PROTOCOL.md; the tables of what happened "
     "inside describe and decide nothing.",

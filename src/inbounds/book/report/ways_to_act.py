@@ -87,7 +87,8 @@ def in_words(cell: Cell) -> str:
     """
     name, _, value = cell.variant.partition("gamma-")
     variant = f"γ = {value}" if value else name.replace("-", " ")
-    return ", ".join(filter(None, [cell.algorithm.upper(), NAMES[cell.family], variant]))
+    start = {"equal": "equal start", "as-they-come": "usual start, fresh seeds"}.get(cell.arm, "")
+    return ", ".join(filter(None, [cell.algorithm.upper(), NAMES[cell.family], start, variant]))
 
 
 def _gains(outcome: Outcome) -> dict[str, Estimate]:

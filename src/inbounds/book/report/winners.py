@@ -42,11 +42,10 @@ def field(rows: Sequence[Evidence]) -> str:
     for word, way in (("above", 1), ("below", -1)):
         found = [row for row in rows if signs[row.law] == way]
         told += [f"{NAMES[row.law]} {word} ({grade(row)})" for row in found]
-    none = [NAMES[law] for law, way in signs.items() if way == 0]
-    if none:
-        told.append(
-            "no difference found" if len(none) == len(rows) else f"{' and '.join(none)}: no difference found"
-        )
+    for word in ("too small to matter, with fresh seeds", "no difference found"):
+        alike = [NAMES[row.law] for row in rows if grade(row) == word]
+        if alike:
+            told.append(word if len(alike) == len(rows) else f"{' and '.join(alike)}: {word}")
     told += [f"{NAMES[law]} not run" for law in LAWS if law not in signs]
     return "; ".join(told)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import json
 import os
 import signal
@@ -18,7 +19,7 @@ from rich.markup import escape
 from rich.progress import track
 from rich.table import Table
 
-from inbounds.book.pages.graded import graders_in
+from inbounds.book.pages.graded import grader_shown
 from inbounds.cli.errors import CommandError
 
 
@@ -54,18 +55,18 @@ def notebooks_in(paths: Sequence[Path]) -> list[Path]:
     return list(dict.fromkeys(found))
 
 
-def graders_called(notebook: Path) -> list[str]:
-    """Return the names of the graders that a notebook calls, in order.
+def graders_shown(notebook: Path) -> dict[int, str]:
+    """Return the graders whose judgements a notebook shows, by the cell's number, in order.
 
     Raises:
         ValueError: the file is no notebook.
     """
     try:
         cells = json.loads(notebook.read_text(encoding="utf8"))["cells"]
-        code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+        code = {n: "".join(cell["source"]) for n, cell in enumerate(cells) if cell["cell_type"] == "code"}
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError("this file is no notebook: ask for it again") from error
-    return [name for source in code for name in graders_in(source)]
+    return {n: name for n, source in code.items() if (name := grader_shown(source))}
 
 
 def grade(notebook: Path, seconds: float, gigabytes: float) -> list[Grade]:
@@ -77,10 +78,10 @@ def grade(notebook: Path, seconds: float, gigabytes: float) -> list[Grade]:
         gigabytes: that it may allocate.
 
     Returns:
-        One grade for each grader that the notebook calls, in order.
+        One grade for each cell of the notebook that shows what a grader says, in order.
     """
     try:
-        wanted = graders_called(notebook)
+        wanted = graders_shown(notebook)
     except ValueError as error:
         return [Grade(notebook, "–", "not reached", str(error))]
     if not wanted:
@@ -91,15 +92,15 @@ def grade(notebook: Path, seconds: float, gigabytes: float) -> list[Grade]:
         report = Path(folder) / "said"
         report.touch()
         reason = _run(notebook, report, seconds, gigabytes)
-        said = [
-            json.loads(line) for line in report.read_text(encoding="utf8").splitlines() if line.endswith("}")
-        ]
+        lines = report.read_text(encoding="utf8").splitlines()
+    said = {found["cell"]: found for found in (json.loads(line) for line in lines if line.endswith("}"))}
     marks = {True: "passed", False: "not yet", None: "not answered"}
-    grades = [
-        Grade(notebook, name, marks[found["passed"]], found["message"])
-        for name, found in zip(wanted, said, strict=False)
+    return [
+        Grade(notebook, name, marks[said[cell]["passed"]], said[cell]["message"])
+        if cell in said
+        else Grade(notebook, name, "not reached", reason)
+        for cell, name in wanted.items()
     ]
-    return grades + [Grade(notebook, name, "not reached", reason) for name in wanted[len(said) :]]
 
 
 def _run(notebook: Path, report: Path, seconds: float, gigabytes: float) -> str:
@@ -146,6 +147,10 @@ def run(paths: Sequence[Path], seconds: float, gigabytes: float, out: Path | Non
         raise CommandError("--seconds and --gigabytes must be positive numbers", 2)
     if out is not None and not out.parent.is_dir():
         raise CommandError(f"there is no folder {out.parent} for the CSV: make it first")
+    if importlib.util.find_spec("IPython") is None:
+        raise CommandError(
+            "grading runs notebooks, which needs IPython: pip install '.[book]' in the project's folder"
+        )
     notebooks = notebooks_in(paths)
     grades: list[Grade] = []
     progress = Console(stderr=True)

@@ -34,12 +34,12 @@ def main(notebook: str, output: str, gigabytes: str) -> int:
     os.chdir(Path(notebook).parent)
     shell = InteractiveShell.instance()
     with open(output, "a", encoding="utf8") as report:
-        for cell in cells:
+        for number, cell in enumerate(cells):
             if cell["cell_type"] != "code":
                 continue
             result = shell.run_cell("".join(cell["source"])).result
             if isinstance(result, Judgement):
-                said = {"exercise": result.exercise, "passed": result.passed, "message": result.message}
+                said = {"cell": number, "passed": result.passed, "message": result.message}
                 print(json.dumps(said, ensure_ascii=False), file=report, flush=True)
     return 0
 

@@ -50,6 +50,8 @@ def load(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as parts:  # torch writes checksums and does not look at them
             bad = parts.testzip()
         state = _to_arrays(torch.load(path, weights_only=True))
+    except (PermissionError, MemoryError):  # the file may be sound
+        raise
     except Exception as error:  # torch raises whatever the damage makes it stumble over
         raise damaged(path, error, remedy) from error
     if bad is not None:

@@ -133,6 +133,8 @@ def read_curves(run: str | Path) -> pa.Table:
     path = find(run, CURVES_FILE)
     try:
         return pq.read_table(path, page_checksum_verification=True)
+    except PermissionError:  # the file may be sound
+        raise
     except (pa.ArrowException, OSError) as error:
         raise damaged(path, error) from error
 
@@ -204,6 +206,8 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
         with safetensors.safe_open(path, "np") as file:
             metadata = json.loads((file.metadata() or {})[METADATA_KEY])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no dictionary)
+    except PermissionError:  # the file may be sound
+        raise
     except (safetensors.SafetensorError, OSError, KeyError, ValueError) as error:
         raise damaged(path, error) from error
     if metadata.get("sha256") != _digest(tensors):

@@ -49,13 +49,13 @@ def find(run: str | Path, name: str) -> Path:
     Example:
         >>> find("no/run", "policies.safetensors")
         Traceback (most recent call last):
-        FileNotFoundError: there is no no/run: train a run first (inbounds train --out no)
+        FileNotFoundError: there is no no/run: train a run first (inbounds train --out no/run)
     """
     path = Path(run)
     if path.is_dir():
         path /= name
     if not path.is_file():
-        out = shlex.quote(str(path.parent))
+        out = shlex.quote(str(path.parent if path.name == name else path))
         raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {out})")
     return path
 

@@ -1,6 +1,6 @@
 """The claims of the source thesis, and what the study says to each.
 
-`verdicts` has the rule, `evidence` and `computed` what decides, `results` and `reasons` the claims.
+`verdicts` has the rule, `evidence` and `computed` what decides, `claims_on_results` and `claims_on_reasons` the claims.
 
 >>> from inbounds.study.outcomes import Outcomes
 >>> from inbounds.study.store import StudyFolder

@@ -40,7 +40,7 @@ class CellLock:
 
     @classmethod
     def take(cls, folder: Path) -> CellLock:
-        """CellLock a cell.
+        """Claim a cell.
 
         Args:
             folder: the cell's work folder; made if missing.

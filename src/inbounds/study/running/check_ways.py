@@ -56,6 +56,8 @@ def check_ways(
 def wrong_evaluation(cell: Cell, folder: StudyFolder) -> str:
     """Return what is wrong with a cell's evaluation, the first thing; empty where nothing is."""
     path, policies = evaluation_file(folder, cell), folder.policy_files(cell)[0]
+    if not policies.is_file():
+        return f"{policies} is missing: {store.restore(policies)}"
     try:
         metadata, table = store.read_metadata(path), store.read_cell(path)
     except DamagedFileError as error:
@@ -86,7 +88,8 @@ def check_replay(cell: Cell, folder: StudyFolder, ways: Sequence[str] = _REPLAYE
         if wrong:
             return Checked(subject, False, f"{wrong[0][1]} instead of {wrong[0][0]}")
         return Checked(subject, True, f"{len(found)} episodes ({', '.join(ways)}) repeated exactly")
-    first = [np.array([row["first_reward"] for row in rows]) for rows in (kept, found)]
+    first = np.array([[row["first_reward"] for row in rows] for rows in (kept, found)])
+    first = first[:, ~np.isnan(first).all(axis=0)]  # a diverged seed has none, here as there
     error = float(np.max(np.abs(first[1] - first[0]) / (1 + np.abs(first[0])), initial=0.0))
     said = f"rewards of the first steps differ by at most {error:.1e} (tolerance {TOLERANCE:g})"
     return Checked(

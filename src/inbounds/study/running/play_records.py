@@ -163,7 +163,7 @@ def records_of(cell: Cell, folder: StudyFolder) -> list[dict[str, Any]]:
 
 
 def publish_records(cells: Sequence[Cell], folder: StudyFolder) -> bool:
-    """Add the records of every logit-normal cell among some that ships its policies and is not there yet.
+    """Add the records of every logit-normal cell among some that ships its policies, unless they are there.
 
     Returns:
         Whether anything had to be done.
@@ -173,9 +173,11 @@ def publish_records(cells: Sequence[Cell], folder: StudyFolder) -> bool:
     kept, policies = [], {}
     if path.is_file():
         kept, policies = store.read_cell(path).to_pylist(), store.read_metadata(path)["policies"]
-    new = [cell for cell in mine if cell.id not in policies]
+    new = [cell for cell in mine if policies.get(cell.id) != store.sha256(folder.policy_files(cell)[0])]
     if not new:
         return False
+    stale = {cell.id for cell in new}  # of policies that have been replaced
+    kept = [row for row in kept if row["cell"] not in stale]
     rows = kept + [row for cell in new for row in records_of(cell, folder)]
     policies |= {cell.id: store.sha256(folder.policy_files(cell)[0]) for cell in new}
     about = {"study_version": STUDY_VERSION, "id": "records", "config": {}, "policies": policies}

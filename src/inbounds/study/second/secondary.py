@@ -166,13 +166,14 @@ TWINS = tuple(
 """Cells of both studies that differ by engine and seeds alone."""
 
 
-def engines_agree(outcomes: Outcomes) -> dict[tuple[str, str, str], Equivalence]:
+def engines_agree(outcomes: Outcomes, level: float = 0.05) -> dict[tuple[str, str, str], Equivalence]:
     """Test whether the compiled engine's returns are those of autograd, by cells that both studies have.
 
     Two one-sided tests (`inbounds.study.statistics.equivalence`) within `MARGINS`, ten seeds a side.
 
     Args:
         outcomes: of both studies.
+        level: of each test; at half of it the interval is that of 95 %.
 
     Returns:
         By family, robot and endpoint; without those whose cells are missing.
@@ -193,6 +194,7 @@ def engines_agree(outcomes: Outcomes) -> dict[tuple[str, str, str], Equivalence]
                 scores(compiled, endpoint),
                 scores(autograd, endpoint),
                 MARGINS[endpoint][robot],
+                level=level,
                 missing="exclude",
             )
     return found

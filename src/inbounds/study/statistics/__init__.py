@@ -9,10 +9,10 @@ and `missing`, and the figures show both.
 
 * `endpoints` — from learning curves to one number per seed: area, final, normalised score.
 * `intervals` — means and interquartile means over seeds with bootstrap intervals.
-* `covering` — what an interval covers, and what few seeds cannot.
+* `interval_coverage` — what an interval covers, and what few seeds cannot.
 * `printed` — means and differences of means with the one interval that they have on every page.
 * `comparisons` — differences of two policies, permutation tests, Holm.
-* `two_one_sided` — whether two policies differ by less than a margin.
+* `equivalence_test` — whether two policies differ by less than a margin.
 * `aggregates` — over environments: IQM, probability of improvement, performance profiles (Agarwal et al. 2021).
 * `resolution` — which differences ten seeds can find.
 """
