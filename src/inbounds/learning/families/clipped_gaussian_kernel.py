@@ -5,7 +5,7 @@ and t = (μ − 1)/σ on the upper, and its derivative by t is the ratio φ(t)/�
 
 $$ H = −P_l log P_l − P_h log P_h + M₀ (log σ + ½ log 2π) + ½ M₂. $$
 
-Tails are evaluated in float64, as `ClippedNormal` does.
+Tails are evaluated in float64.
 """
 
 from __future__ import annotations
