@@ -255,6 +255,7 @@ class Collector:
         get_state = getattr(self.envs, "get_state", None)
         return {
             "envs": get_state() if get_state is not None else None,
+            "box": self._box(),
             "obs": self.obs.copy(),
             "returns": self.returns.copy(),
             "normalizer": self.normalizer and self.normalizer.state_dict(),
@@ -262,7 +263,16 @@ class Collector:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to a state. Environments without `set_state` start new episodes instead."""
+        """Go back to a state. Environments without `set_state` start new episodes instead.
+
+        Raises:
+            ValueError: the environment's actions have other bounds than they had.
+        """
+        if "box" in state and not all(map(np.array_equal, state["box"], self._box())):
+            raise ValueError(
+                "the environment's action bounds are not those that the run began with: "
+                "use that environment, or another run directory"
+            )
         restore_generators([stream.noise for stream in self.streams], state["noise"])
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
@@ -272,6 +282,10 @@ class Collector:
             envs: Any = self.envs if hasattr(self.envs, "set_state") else self.envs.unwrapped
             envs.set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
+
+    def _box(self) -> list[np.ndarray]:
+        box: Any = self.envs.single_action_space
+        return [box.low.copy(), box.high.copy()]
 
 
 @torch.no_grad()

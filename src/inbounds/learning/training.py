@@ -193,7 +193,6 @@ class Trainer:
         """Return everything that the future depends on, and the records so far; later epochs leave it as it is."""
         return {
             "config": describe(self.config),
-            "box": self._box(),
             "networks": self.networks.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "collector": self.collector.state_dict(),
@@ -215,28 +214,12 @@ class Trainer:
                 f"the checkpoint belongs to another configuration ({changes}): "
                 "use that one, or another run directory"
             )
-        self._require_same_spaces(state)
         self.networks.load_state_dict(state["networks"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.collector.load_state_dict(state["collector"])
         restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
         self.records = list(state["records"])
         self.diverged = state["diverged"].copy()
-
-    def _box(self) -> list[np.ndarray]:
-        box: Any = self.envs.single_action_space
-        return [box.low.copy(), box.high.copy()]
-
-    def _require_same_spaces(self, state: dict[str, Any]) -> None:
-        """Raise if the environment's spaces are not those that the run began with."""
-        remedy = "use the environment that the run began with, or another run directory"
-        for name, net in zip(("actor", "critic"), self.networks.networks, strict=True):
-            if state["networks"][name].shape != net.theta.shape:
-                raise ValueError(
-                    f"the environment's observations or actions have another size than they had: {remedy}"
-                )
-        if "box" in state and not all(map(np.array_equal, state["box"], self._box())):
-            raise ValueError(f"the environment's action bounds are not those that they were: {remedy}")
 
 
 def train(

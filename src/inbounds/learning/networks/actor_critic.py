@@ -150,6 +150,15 @@ class ActorCritic:
         return {"actor": self.actor.theta.clone(), "critic": self.critic.theta.clone()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to weights from `state_dict`."""
+        """Go back to weights from `state_dict`.
+
+        Raises:
+            ValueError: they are of other observations or actions.
+        """
+        if state["actor"].shape != self.actor.theta.shape or state["critic"].shape != self.critic.theta.shape:
+            raise ValueError(
+                "the environment's observations or actions have another size than when the run began: "
+                "use that environment, or another run directory"
+            )
         self.actor.theta.copy_(state["actor"])
         self.critic.theta.copy_(state["critic"])
