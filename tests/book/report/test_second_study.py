@@ -5,8 +5,10 @@ import re
 import pytest
 
 from inbounds.book.report import second_study as views
+from inbounds.study.analysis import estimate
 from inbounds.study.grid import SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.words import spoken
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
@@ -29,6 +31,7 @@ def test_nothing_is_called_missing(tmp_path) -> None:
     nothing = Outcomes.read(folder_in(tmp_path))
     for view in (
         views.primary_comparison,
+        views.cells,
         views.equal_starts,
         views.secondary_comparisons,
         views.engine_check,
@@ -47,6 +50,22 @@ def test_the_primary_table(outcomes: Outcomes) -> None:
     assert by["Swimmer", "Beta", "final return"][-1] == "10"
     assert by["Swimmer", "Beta", "final return"][4] == "waits for seeds"
     assert by["Walker2d", "Beta", "final return"][4] == "missing"
+
+
+def test_every_cell_is_told_with_its_greedy_return(outcomes: Outcomes) -> None:
+    _, *rows = rows_of(views.cells(outcomes))
+    assert len(rows) == 3 * 5 + 2 * 3
+    seen = outcomes.and_of(second_cells()).finished["equal-hopper-ppo-beta"]
+    (row,) = [
+        r for r in rows if r[0] == "Hopper" and r[1].startswith("PPO: Beta") and r[-1].startswith("10–19")
+    ]
+    for number, endpoint in zip(row[2:5], ("final", "area", "greedy"), strict=True):
+        assert number.startswith(
+            spoken(estimate(seen, endpoint)).partition("\N{NO-BREAK SPACE}")[0].split()[0]
+        )
+    failed = {r[0] + r[1].removesuffix(", start failed") for r in rows if r[1].endswith("start failed")}
+    checks = rows_of(views.equal_starts(outcomes))[1:]
+    assert failed == {r[0] + r[1] for r in checks if r[3].endswith("failed")}
 
 
 def test_the_start_that_is_not_equal_is_called_failed(outcomes: Outcomes) -> None:

@@ -6,7 +6,7 @@ Each reads the cells of the second study from wherever the first study's outcome
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.study_panels import left_out
 from inbounds.book.report.words import HEADS
+from inbounds.study.analysis import estimate
+from inbounds.study.cell import Cell
 from inbounds.study.grid import FREE, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
@@ -171,16 +173,52 @@ def over_robots(outcomes: Outcomes) -> Shown:
     return html.of_study("the primary columns over all robots", html.table(caption, head, rows, words=(0, 1)))
 
 
+def cells(outcomes: Outcomes) -> Shown:
+    """Return what each finished cell earned: final return, area, and the greedy return, which decides nothing."""
+    found = _second(outcomes)
+    rows = [
+        [
+            cell.robot,
+            f"{cell.algorithm.upper()}: {_name(found, cell)}",
+            *(spoken(estimate(outcome, endpoint)) for endpoint in (*ENDPOINTS, "greedy")),
+            f"{cell.seeds[0]}–{cell.seeds[-1]}{', ' * bool(diverged)}{diverged}",
+        ]
+        for cell in second_cells()
+        if (outcome := found.finished.get(cell.id))
+        for diverged in [f"{outcome.diverged.sum()} diverged" if outcome.diverged.any() else ""]
+    ]
+    if not rows:
+        return html.of_study("the second study's cells", NONE_FINISHED)
+    caption = "Every finished cell of the second study. Greedy: by the median, the last five evaluations of the training."
+    head = ["robot", "column", "final return", "area", "greedy return", "seeds"]
+    return html.of_study("the second study's cells", html.table(caption, head, rows, words=(0, 1, 5)))
+
+
+def _column_of(cell: Cell) -> Column:
+    return Column(cell.arm, cell.algorithm, cell.family, cell.variant)
+
+
+def _name(found: Outcomes, cell: Cell) -> str:
+    """Return what a cell's column is called, and whether its start failed the manipulation check."""
+    failed = _failed(cell, starts(found, _column_of(cell), cell.robot))
+    return column_name(_column_of(cell)) + (", start failed" if failed else "")
+
+
+def _failed(cell: Cell, start: Mapping[str, float] | None) -> bool:
+    """Return whether a column executes other noise before training than it was asked for."""
+    asked = cell.config.policy.initial_std
+    return start is not None and asked is not None and abs(start["action_std"] - asked) > TOLERANCE
+
+
 def equal_starts(outcomes: Outcomes) -> Shown:
     """Return the manipulation check: what each column does before training, and whether the start is equal."""
     found = _second(outcomes)
     rows = []
     for cell in second_cells():
-        column = Column(cell.arm, cell.algorithm, cell.family, cell.variant)
+        column = _column_of(cell)
         if (start := starts(found, column, cell.robot)) is None:
             continue
-        asked = cell.config.policy.initial_std
-        failed = asked is not None and abs(start["action_std"] - asked) > TOLERANCE
+        asked, failed = cell.config.policy.initial_std, _failed(cell, start)
         rows.append(
             [
                 cell.robot,
@@ -262,6 +300,7 @@ def second_study(outcomes: Outcomes) -> Iterator[str]:
     for title, view in (
         ("Finished cells", progress),
         ("Primary comparison", primary_comparison),
+        ("Every cell", cells),
         ("Over all robots", over_robots),
         ("Before training", equal_starts),
         ("The two engines", engine_check),
