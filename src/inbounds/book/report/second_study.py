@@ -189,7 +189,7 @@ def cells(outcomes: Outcomes) -> Shown:
     ]
     if not rows:
         return html.of_study("the second study's cells", NONE_FINISHED)
-    caption = "Every finished cell of the second study. Greedy: by the median, the last five evaluations of the training."
+    caption = "Every finished cell. Greedy: by the median, the last five evaluations of the training."
     head = ["robot", "column", "final return", "area", "greedy return", "seeds"]
     return html.of_study("the second study's cells", html.table(caption, head, rows, words=(0, 1, 5)))
 
