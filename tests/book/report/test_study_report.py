@@ -99,7 +99,7 @@ def test_nothing_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     page = Page(out.read_text(encoding="utf8"))
     assert page.images == []
     assert (
-        len(page.missing) == 3 + 5 + 1 + 5 + 1
+        len(page.missing) == 3 + 5 + 1 + 6 + 1
     )  # arms, groups of the fourth, cells of later, second study, provenance
     assert page.table("Finished cells")[1] == ["Arm 1: standard practice", *["0 of 5"] * 6]
 
