@@ -199,8 +199,8 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
     ]
     if studies == {1, 2}:
         said.append(
-            "Filled: fresh seeds, the second study, whose Gaussian has one free σ per action. Hollow: the first study, "
-            "whose Gaussian has a σ that depends on the state."
+            "Filled: fresh seeds, the second study, whose Gaussian has a free σ, one per action dimension. Hollow: the "
+            "first study, whose Gaussian has a σ that depends on the state."
         )
     else:
         said.append(
