@@ -38,7 +38,7 @@ notebooks: setup  ## execute notebooks and store their text outputs  (NB=noteboo
 
 pages: book  ## open every built page in headless Chromium, six in Firefox, and check them
 	@tools/setup.sh --with-browsers
-	$(PY) -m pytest -q -m pages -n 2 --dist loadgroup tests/pages
+	$(PY) -m pytest -q -m pages -n 2 --dist loadscope tests/pages
 
 lighthouse: book  ## how fast six pages come to a phone, by Lighthouse  (about five minutes, quiet machine)
 	@tools/setup.sh --with-chromium
