@@ -21,10 +21,9 @@ class PageByPage(LoadScopeScheduling):
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        if page := re.search(r"\[.*?([\w/]+\.html)", nodeid):
-            return page[1]
         module = nodeid.partition("::")[0].rpartition("/")[2]
-        return module if module in SHARED else nodeid
+        page = None if module in SHARED else re.search(r"\[.*?([\w/]+\.html)", nodeid)
+        return page[1] if page else module if module in SHARED else nodeid
 
 
 @pytest.hookimpl(optionalhook=True)  # nobody asks where pytest-xdist is switched off
