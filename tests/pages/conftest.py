@@ -22,8 +22,10 @@ class PageByPage(LoadScopeScheduling):
 
     def _split_scope(self, nodeid: str) -> str:
         module = nodeid.partition("::")[0].rpartition("/")[2]
-        page = None if module in SHARED else re.search(r"\[.*?([\w/]+\.html)", nodeid)
-        return page[1] if page else module if module in SHARED else nodeid
+        if module in SHARED:
+            return module
+        page = re.search(r"\[.*?([\w/]+\.html)", nodeid)
+        return page[1] if page else nodeid
 
 
 @pytest.hookimpl(optionalhook=True)  # nobody asks where pytest-xdist is switched off

@@ -111,7 +111,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
         ),
         html.table(caption, head, table, words=(0, 1, 2, 4)),
-        *_without_diverged(_second(outcomes)),
+        *_without_diverged(_second(outcomes), rows),
     )
 
 
@@ -120,9 +120,9 @@ def _seeds(difference: Estimate | None) -> str:
     return (left_out(difference) or str(difference.n)) if difference else ""
 
 
-def _without_diverged(outcomes: Outcomes) -> Iterator[str]:
+def _without_diverged(outcomes: Outcomes, rows: Sequence[PrimaryRow]) -> Iterator[str]:
     """Yield the primary findings without diverged seeds, if any seed diverged; those that count are with them."""
-    with_them = {(r.law, r.endpoint, r.robot): r for r in primary(outcomes)}
+    with_them = {(r.law, r.endpoint, r.robot): r for r in rows}
     if not any(row.difference is not None and row.difference.diverged for row in with_them.values()):
         return
     table = [
