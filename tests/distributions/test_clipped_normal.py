@@ -136,6 +136,23 @@ def test_entropy_is_minus_the_mean_log_prob(
     assert float(p.entropy()) == pytest.approx(-expect(p, log_prob_at(p)), rel=1e-6, abs=1e-6)
 
 
+def test_the_standard_deviation_has_a_gradient_where_it_underflows() -> None:
+    loc = torch.tensor([1000.0, 0.5], dtype=torch.float64, requires_grad=True)
+    p = ClippedNormal(loc, 0.5, -1.0, 1.0)
+    assert p.stddev.detach().tolist() == [
+        0.0,
+        pytest.approx(math.sqrt(float(p.variance[1].detach())), rel=1e-15),
+    ]
+    (gradient,) = torch.autograd.grad(p.stddev.sum(), loc)
+    assert gradient[0] == 0
+    assert float(gradient[1]) == pytest.approx(_slope_of_stddev(0.5), rel=1e-7)
+
+
+def _slope_of_stddev(loc: float, step: float = 1e-5) -> float:
+    low, high = (ClippedNormal(*double(x, 0.5), -1.0, 1.0).stddev for x in (loc - step, loc + step))
+    return float(high - low) / (2 * step)
+
+
 def test_entropy_at_its_limits() -> None:
     """All on one bound: 0. Shared by the bounds: log 2. Nothing clipped: the Normal's. Its unit matters."""
     assert float(law(50.0, 0.0).entropy()) == pytest.approx(0.0, abs=1e-12)

@@ -104,6 +104,10 @@ def test_each_robot_of_a_vector_environment():
     assert (frames[0] != frames[1]).any()
     with pytest.raises(IndexError, match="0 to 1"):
         RobotRenderer(envs, index=2)
+    with RobotRenderer(envs) as renderer:
+        for index in (-1, 2):
+            with pytest.raises(IndexError, match="0 to 1"):
+                renderer.frame(index)
 
 
 def test_an_environment_without_mujoco_is_refused():

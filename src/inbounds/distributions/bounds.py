@@ -217,14 +217,7 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
         >>> parameters["low"].tolist(), parameters["low"].dtype, parameters["high"].shape
         ([-1.0, -2.0, -3.0], torch.float32, torch.Size([3]))
     """
-    given = {
-        name: torch.tensor(value)
-        if isinstance(value, np.ndarray)
-        else value.item()  # a number, which adapts
-        if isinstance(value, np.generic)
-        else value
-        for name, value in parameters.items()
-    }
+    given = {name: _without_numpy(value) for name, value in parameters.items()}
     own = [v for name, v in given.items() if isinstance(v, Tensor) and name not in ("low", "high")]
     leading = own or [v for v in given.values() if isinstance(v, Tensor)]
     dtype = leading[0].dtype if leading else torch.get_default_dtype()
@@ -243,6 +236,12 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
             "of shape [..., act_dim]."
         ) from None
     return dict(zip(given, tensors, strict=True))
+
+
+def _without_numpy(value: TensorLike) -> TensorLike:
+    if isinstance(value, np.ndarray):
+        return torch.tensor(value)
+    return value.item() if isinstance(value, np.generic) else value  # a number adapts to the others' type
 
 
 def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:

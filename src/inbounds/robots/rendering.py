@@ -90,7 +90,7 @@ class RobotRenderer:
         self, env: Any, *, index: int = 0, width: int = 320, height: int = 240, camera: Camera | None = None
     ) -> None:
         headless.require_backend()
-        self._index = index
+        self._index, self._count = index, _count(env)
         model, self._get_data = _simulation(env, index)
         self._model = _quick_to_draw(model, width, height)
         self._data = mujoco.MjData(self._model)
@@ -116,8 +116,13 @@ class RobotRenderer:
 
         Args:
             index: which robot of a vector environment; by default the renderer's own.
+
+        Raises:
+            IndexError: there is no robot of that index.
         """
-        data = self._get_data(self._index if index is None else index)
+        index = self._index if index is None else index
+        _require_robot(index, self._count)
+        data = self._get_data(index)
         mujoco.mj_getState(self._model, data, self._state, _STATE)
         mujoco.mj_setState(self._model, self._data, self._state, _STATE)
         mujoco.mj_kinematics(self._model, self._data)
@@ -236,9 +241,7 @@ def is_drawable(env: Any) -> bool:
 
 def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], mujoco.MjData]]:
     """Return an environment's model, and a function from a robot's index to its present data."""
-    count = getattr(env, "num_envs", 1)
-    if not 0 <= index < count:
-        raise IndexError(f"index {index} is out of range: this environment has robots 0 to {count - 1}")
+    _require_robot(index, _count(env))
     inner = env.unwrapped
     if hasattr(inner, "get_data"):  # this package's vector environments
         return inner.model, inner.get_data
@@ -249,6 +252,15 @@ def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], m
             "SyncVectorEnv or inbounds.robots.make(...)"
         )
     return singles[index].model, lambda i: singles[i].data
+
+
+def _count(env: Any) -> int:
+    return int(getattr(env, "num_envs", 1))
+
+
+def _require_robot(index: int, count: int) -> None:
+    if not 0 <= index < count:
+        raise IndexError(f"index {index} is out of range: this environment has robots 0 to {count - 1}")
 
 
 def _step_time(env: Any) -> float:

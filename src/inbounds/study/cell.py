@@ -171,6 +171,11 @@ class Cell:
         return _algorithm(**dict(self.overrides))(start)
 
     @property
+    def kept_config(self) -> TrainConfig:
+        """The configuration of a run of the seeds whose policies are kept."""
+        return dataclasses.replace(self.config, seeds=self.kept_seeds)
+
+    @property
     def digest(self) -> str:
         """SHA-256 of the study's version and of every value that decides the cell's results."""
         return digest_of(self.config, self.version)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inbounds.book.explorer.claims import claims
-from inbounds.book.report import ledger_table, study_pages
+from inbounds.book.report import arms, ledger_table, study_pages
 from inbounds.book.report.changes import GROUPS
 from inbounds.book.report.html import Shown
 from inbounds.book.report.score_tables import PUBLISHED, THESIS
@@ -206,3 +206,10 @@ def test_films_that_cannot_be_shown_are_called_missing(nothing: Outcomes) -> Non
 def test_without_the_source_tree_the_message_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="clone the project"):
         study_pages.shipped(tmp_path)
+
+
+def test_a_share_at_a_clamp_counts_each_parameter_once() -> None:
+    at = {"at_alpha_max": np.full((2, 3), 0.5), "at_beta_max": np.full((2, 3), 1.0), "kl": np.ones((2, 3))}
+    np.testing.assert_array_equal(arms._share_at_a_clamp(at), 0.75)
+    ends = {"at_log_std_min": np.full((2, 3), 0.25), "at_log_std_max": np.full((2, 3), 0.5)}
+    np.testing.assert_array_equal(arms._share_at_a_clamp(ends), 0.75)

@@ -244,14 +244,23 @@ def inside(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     rows = []
     for robot, label, outcome in part.finished():
         numbers = [_first_and_last(outcome.measured[name]) for name in _DIAGNOSTICS]
-        clamps = np.sum([v for name, v in outcome.measured.items() if name.startswith("at_")], 0)
-        rows.append([robot, label, *numbers, _first_and_last(clamps)])
+        rows.append([robot, label, *numbers, _first_and_last(_share_at_a_clamp(outcome.measured))])
     caption = (
         f"What happened inside ({part.title}): medians over seeds, of the first epoch → of the last five "
         "measurements. Spread, saturation and clamps of the first epoch are the untrained policy's: its noise. Later "
         "most of the spread is the policy's own movement. These numbers describe; they decide nothing."
     )
     return part.shown("inside", html.table(caption, head, rows, words=(0, 1)))
+
+
+def _share_at_a_clamp(measured: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the share of a law's clamped parameters that stand at a clamp: of log σ, or of α and β together."""
+    shares: dict[str, np.ndarray] = {}
+    for name, share in measured.items():
+        if name.startswith("at_"):
+            parameter = name.removesuffix("_min").removesuffix("_max")
+            shares[parameter] = shares.get(parameter, 0.0) + share
+    return np.mean(list(shares.values()), axis=0)
 
 
 def _first_and_last(values: np.ndarray) -> str:

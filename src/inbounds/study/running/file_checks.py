@@ -6,7 +6,6 @@ where nothing is.
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -89,8 +88,7 @@ def wrong_policies(cell: Cell, path: Path) -> str:
         policies = load_policies(path)
     except (ValueError, KeyError, IndexError, RuntimeError) as error:
         return str(error).partition(": ")[0]
-    kept = dataclasses.replace(cell.config, seeds=cell.kept_seeds)
-    if different := changed_fields(kept, describe(policies[0].config)):
+    if different := changed_fields(cell.kept_config, describe(policies[0].config)):
         name, (there, here) = next(iter(different.items()))
         return f"these are policies of another configuration ({name} is {there!r} instead of {here!r})"
     return ""

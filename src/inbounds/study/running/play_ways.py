@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -117,7 +116,7 @@ def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
     path = folder.policy_files(cell)[0]
     load_policies(path)  # looks at its checksum
     tensors = safetensors.numpy.load_file(path)
-    trainer = Trainer(replace(cell.config, seeds=cell.kept_seeds))
+    trainer = Trainer(cell.kept_config)
     with torch.no_grad():
         for i, layer in enumerate(trainer.networks.actor.layers):
             layer.weight[:] = torch.from_numpy(tensors[f"policy.{i}.weight"])
