@@ -59,7 +59,7 @@ lab: setup  ## open JupyterLab on the chapters without solutions, in lab/ (your 
 	@$(PY) tools/student_copies.py lab
 	@$(PY) -m jupyterlab --notebook-dir=lab $(if $(filter 0,$(shell id -u)),--allow-root)
 
-bench: setup  ## measure speed beside peers and beside the physics floor  (about 15 min, quiet machine)
+bench: setup  ## measure speed beside peers and beside the physics floor  (about 25 min, quiet machine)
 	@$(PY) -m benchmarks.run
 
 dist: book  ## zip the built book for reading offline

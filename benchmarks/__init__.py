@@ -4,6 +4,8 @@
 * `python -m benchmarks.anatomy`: where the time of one epoch goes.
 * `python -m benchmarks.validate`: learning curves beside stable-baselines3's, with a test of equivalence.
 * `python -m benchmarks.anchor`: the same for the second study, by its protocol.
+* `python -m benchmarks.engines`: the learning curves of the compiled engine beside autograd's.
+* `python -m benchmarks.live`: the robot in the browser beside the study's.
 
 Peers come with the extra `bench`; those of another stack (SBX, CleanRL) may live in another environment, see
 `python -m benchmarks.run --help`.

@@ -3,7 +3,7 @@
 The page runs MuJoCo's WebAssembly build, some versions behind Python's. From a recorded state one step is repeated
 with the same action; from a start the same policy then runs free in both, acting by its median, until the
 observations part; and 20 episodes with noise are compared with those that the study played. What was found is in
-`results/live.json`.
+`benchmarks/results/live.json`.
 
     python -m benchmarks.live          about ten minutes
     python -m benchmarks.live --quick  does it run? half a minute

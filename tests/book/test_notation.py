@@ -9,7 +9,7 @@ from tests.book import anatomy
 
 PAGE = anatomy.ROOT / "book" / "notation.md"
 RETIRED = {
-    # how the first edition wrote it → how it is written now
+    # how it was written once → how it is written now
     r"\\eta\(\\(?:theta|pi)": r"J(\theta)",
     r"(?<![A-Za-z\\])R\(a\)": "r(a)",
     r"(?<![A-Za-z\\])R_t\b": r"\hat G_t",

@@ -167,7 +167,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Study:
-    """Run the book's study: all algorithms, families and robots, ten seeds each.
+    """Run the book's two studies: algorithms, families and robots, ten seeds a cell.
 
     `inbounds study --help` shows its own commands and options.
     """

@@ -163,7 +163,7 @@ def study(args: Sequence[str]) -> int:
     read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
     kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
     description = (
-        "The study of the book: all algorithms, families and robots, ten seeds each. "
+        "The two studies of the book: algorithms, families and robots, ten seeds a cell. "
         "inbounds study dial: a small task, and when the law matters there."
     )
     console = Console(highlight=False, force_jupyter=False)
