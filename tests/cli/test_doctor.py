@@ -95,7 +95,7 @@ def test_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=1e9))
     code, out = only(monkeypatch, doctor.look_at_disk)
     assert code == 1
-    assert "✗ disk: 1.0 GB free here free 2.0 GB, or work in another folder" in out
+    assert "✗ disk: 1.0 GB free here free 3.0 GB, or work in another folder" in out
 
 
 @pytest.mark.slow

@@ -148,6 +148,16 @@ def test_the_standard_deviation_has_a_gradient_where_it_underflows() -> None:
     assert float(gradient[1]) == pytest.approx(_slope_of_stddev(0.5), rel=1e-7)
 
 
+@pytest.mark.parametrize("log_scale", [-10.0, -1.0, 1.0])
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_the_score_is_finite_within_the_limits_of_a_policy(dtype: torch.dtype, log_scale: float) -> None:
+    loc = torch.linspace(-3, 3, 601, dtype=dtype, requires_grad=True)
+    p = ClippedNormal(loc, math.exp(log_scale), -1.0, 1.0)
+    value = p.median.detach()
+    for gradient in torch.autograd.grad(p.log_prob(value).sum(), [loc]):
+        assert torch.isfinite(gradient).all()
+
+
 def _slope_of_stddev(loc: float, step: float = 1e-5) -> float:
     low, high = (ClippedNormal(*double(x, 0.5), -1.0, 1.0).stddev for x in (loc - step, loc + step))
     return float(high - low) / (2 * step)

@@ -202,10 +202,12 @@ class ClippedNormal(BoundedDistribution):
         return Normal(self.loc, self.scale, validate_args=False)
 
     def _log_prob_inside(self, value: Tensor) -> Tensor:
-        on_low = log_ndtr((self.low - self.loc) / self.scale)
-        on_high = log_ndtr((self.loc - self.high) / self.scale)
+        is_low, is_high = value == self.low, value == self.high
+        # Chosen before log_ndtr: far out its gradient overflows, and would be NaN where the action is not on a bound.
+        on_low = log_ndtr(torch.where(is_low, (self.low - self.loc) / self.scale, 0.0))
+        on_high = log_ndtr(torch.where(is_high, (self.loc - self.high) / self.scale, 0.0))
         between = self._normal().log_prob(value)
-        return torch.where(value == self.low, on_low, torch.where(value == self.high, on_high, between))
+        return torch.where(is_low, on_low, torch.where(is_high, on_high, between))
 
     def _parts(self) -> _Parts:
         loc, scale = self.loc.double(), self.scale.double()

@@ -1,4 +1,4 @@
-"""What a robot sees, what it is paid for, when it falls, and how it starts: four of the package's six v5 tasks of Gymnasium.
+"""What a robot sees, what it is paid for, when it falls, and how it starts: four of the six v5 tasks.
 
 Each task is written once, for a batch: `[N, …]` arrays hold N robots, and every formula is Gymnasium's, in
 Gymnasium's order of operations, so that the numbers agree to the last bit. Ant and Humanoid, which also feel
