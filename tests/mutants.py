@@ -162,7 +162,7 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "the atoms are scored as density",
         "distributions/clipped_normal.py",
-        "return torch.where(value == self.low, on_low, torch.where(value == self.high, on_high, between))",
+        "return torch.where(is_low, on_low, torch.where(is_high, on_high, between))",
         "return between",
         "tests/distributions/test_clipped_normal.py::test_capg_is_unbiased_with_lower_variance",
     ),

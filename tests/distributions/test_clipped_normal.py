@@ -136,31 +136,13 @@ def test_entropy_is_minus_the_mean_log_prob(
     assert float(p.entropy()) == pytest.approx(-expect(p, log_prob_at(p)), rel=1e-6, abs=1e-6)
 
 
-def test_the_standard_deviation_has_a_gradient_where_it_underflows() -> None:
-    loc = torch.tensor([1000.0, 0.5], dtype=torch.float64, requires_grad=True)
-    p = ClippedNormal(loc, 0.5, -1.0, 1.0)
-    assert p.stddev.detach().tolist() == [
-        0.0,
-        pytest.approx(math.sqrt(float(p.variance[1].detach())), rel=1e-15),
-    ]
-    (gradient,) = torch.autograd.grad(p.stddev.sum(), loc)
-    assert gradient[0] == 0
-    assert float(gradient[1]) == pytest.approx(_slope_of_stddev(0.5), rel=1e-7)
-
-
 @pytest.mark.parametrize("log_scale", [-10.0, -1.0, 1.0])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_the_score_is_finite_within_the_limits_of_a_policy(dtype: torch.dtype, log_scale: float) -> None:
     loc = torch.linspace(-3, 3, 601, dtype=dtype, requires_grad=True)
     p = ClippedNormal(loc, math.exp(log_scale), -1.0, 1.0)
-    value = p.median.detach()
-    for gradient in torch.autograd.grad(p.log_prob(value).sum(), [loc]):
-        assert torch.isfinite(gradient).all()
-
-
-def _slope_of_stddev(loc: float, step: float = 1e-5) -> float:
-    low, high = (ClippedNormal(*double(x, 0.5), -1.0, 1.0).stddev for x in (loc - step, loc + step))
-    return float(high - low) / (2 * step)
+    (score,) = torch.autograd.grad(p.log_prob(p.median.detach()).sum(), loc)
+    assert torch.isfinite(score).all()
 
 
 def test_entropy_at_its_limits() -> None:

@@ -360,3 +360,13 @@ def test_next_to_a_bound_at_zero_nothing_is_lost() -> None:
         distribution = LogitNormal(*double(0.0, 1.0), low, high)
         back = distribution.value_to_latent(distribution.latent_to_value(z))
         torch.testing.assert_close(back, z, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("law", [ClippedNormal, LogitNormal])
+def test_the_standard_deviation_has_a_gradient_where_it_underflows(law: Any) -> None:
+    loc = torch.tensor([1000.0, 0.5], dtype=torch.float64, requires_grad=True)
+    stddev = law(loc, 0.5, -1.0, 1.0).stddev
+    assert stddev[0] == 0
+    (gradient,) = torch.autograd.grad(stddev.sum(), loc)
+    below, above = law(*double([0.5 - 1e-5, 0.5 + 1e-5], 0.5), -1.0, 1.0).stddev
+    assert gradient.tolist() == pytest.approx([0.0, float(above - below) / 2e-5], rel=1e-7)

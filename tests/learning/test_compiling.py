@@ -1,11 +1,13 @@
 """Compiled functions are read from disk: a process that finds nothing there computes the bits of one that does."""
 
+import inspect
 import json
 import os
 import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -130,10 +132,24 @@ def test_another_folder_is_named(nothing_on_disk: Path, monkeypatch: pytest.Monk
         ReadFromDisk(make_see)(*numbers())
 
 
-def test_what_is_kept_is_not_found_after_a_change_of_what_it_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("changed", [compiling, *compiling.ALWAYS_CALLED], ids=lambda module: module.__name__)
+def test_what_is_kept_is_not_found_after_a_change_of_what_it_calls(
+    changed: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = kept_on_disk(kernels.see, fast=()).py_func.__qualname__
-    monkeypatch.setattr(compiling.inspect, "getsource", lambda module: module.__name__)
+    source = inspect.getsource
+    monkeypatch.setattr(inspect, "getsource", lambda module: source(module) + "#" * (module is changed))
     assert kept_on_disk(kernels.see, fast=()).py_func.__qualname__ != before
+
+
+@pytest.mark.parametrize("family", ["gaussian", "clipped_gaussian", "logit_normal", "beta"])
+def test_each_module_that_is_called_is_in_the_name(family: str) -> None:
+    module = f"inbounds.learning.families.{family}_kernel"
+    passes = make_ppo_passes(module).py_func
+    called = {kernel.py_func.__module__ for kernel in compiling._kernels_below(passes)}
+    named = {module, passes.__module__, *(one.__name__ for one in compiling.ALWAYS_CALLED)}
+    assert module in called
+    assert called <= named
 
 
 def test_what_is_asked_of_the_other_process_can_be_pickled() -> None:

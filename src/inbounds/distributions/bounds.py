@@ -108,6 +108,13 @@ class BoundedDistribution(Distribution):
         """`[...]` length of the interval, high − low, in units of the action."""
         return self.high - self.low
 
+    @property
+    def stddev(self) -> Tensor:
+        """`[...]` standard deviation of the value; where the variance underflows to 0, so does its gradient."""
+        variance = self.variance
+        spread = variance > 0
+        return torch.where(spread, torch.where(spread, variance, 1.0).sqrt(), 0.0)
+
     def sample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
         """Return samples `[*sample_shape, ...]`, cut off from the graph; see `rsample`."""
         with torch.no_grad():

@@ -176,13 +176,6 @@ class ClippedNormal(BoundedDistribution):
         return (self.scale.double().square() * unit_variance).to(self.low.dtype)
 
     @property
-    def stddev(self) -> Tensor:
-        """`[...]` standard deviation of the clipped value; where it underflows to 0, so does its gradient."""
-        variance = self.variance
-        spread = variance > 0
-        return torch.where(spread, torch.where(spread, variance, 1.0).sqrt(), 0.0)
-
-    @property
     def median(self) -> Tensor:
         """`[...]` median of the value: loc, clipped."""
         return torch.clamp(self.loc, self.low, self.high)

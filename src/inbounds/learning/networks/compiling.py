@@ -25,11 +25,12 @@ import numba
 from numba.core import config, event
 from numba.core.dispatcher import Dispatcher
 
-from inbounds.distributions import quadrature
-from inbounds.learning.families import gaussian, logit_normal
-from inbounds.learning.networks import kernels
+from inbounds.distributions import quadrature, standard_normal
+from inbounds.learning.families import gaussian, gaussian_kernel, logit_normal
+from inbounds.learning.networks import kernels, normalizer
 from inbounds.learning.networks.kernels import FAST
 
+ALWAYS_CALLED = (kernels, normalizer, gaussian, gaussian_kernel, logit_normal, quadrature, standard_normal)
 _TRIES = 3
 
 
@@ -57,10 +58,10 @@ def kept_on_disk(function: Any, *modules: ModuleType, fast: Collection[str] = tu
 
     Args:
         function: of a module, calls functions made by `kernel` only.
-        modules: where these come from, beside `networks.kernels`.
+        modules: where these come from, beside `ALWAYS_CALLED`.
         fast: fast-math flags.
     """
-    sources = [sys.modules[__name__], kernels, gaussian, logit_normal, quadrature, *modules]
+    sources = [sys.modules[__name__], *ALWAYS_CALLED, *modules]
     digest = hashlib.sha256("".join(map(inspect.getsource, sources)).encode()).hexdigest()
     function = bound_to(function)
     function.__qualname__ = f"{function.__name__}_{digest[:16]}"
