@@ -109,8 +109,8 @@
       });
     }
     still.addEventListener("change", () => { wanted = !still.matches; if (wanted) start(); else stop(); });
-    new IntersectionObserver(([{ isIntersecting }]) => {
-      seen = isIntersecting;
+    new IntersectionObserver((entries) => {
+      seen = entries.at(-1).isIntersecting;
       if (seen) start(); else stop();
     }).observe(row);
   }
@@ -128,14 +128,15 @@
     const [first, last] = [around(range.startContainer), around(range.endContainer)];
     if (first) range.setStartBefore(first);
     if (last) range.setEndAfter(last);
-    const box = document.body.appendChild(document.createElement("div"));
-    box.append(range.cloneContents());
-    const formulas = box.querySelectorAll("[data-tex]");
-    for (const each of formulas) each.textContent = each.matches("div") ? `$$${each.dataset.tex}$$` : `$${each.dataset.tex}$`;
-    const text = box.innerText;
-    box.remove();
+    const copy = range.cloneContents();
+    const formulas = copy.querySelectorAll("[data-tex]");
     if (!formulas.length) return;
-    event.clipboardData.setData("text/plain", text);
+    for (const input of copy.querySelectorAll("input")) input.remove(); /* a copied choice would take the tick from the reader's */
+    for (const each of formulas) each.textContent = each.matches("div") ? `$$${each.dataset.tex}$$` : `$${each.dataset.tex}$`;
+    const box = document.body.appendChild(document.createElement("div"));
+    box.append(copy);
+    event.clipboardData.setData("text/plain", box.innerText);
+    box.remove();
     event.preventDefault();
   });
 

@@ -74,8 +74,10 @@
 
   const lock = (box) => {
     const done = known(box);
+    const button = box.querySelector(".guess-check");
+    if (done && document.activeElement?.matches("input") && box.contains(document.activeElement)) button.focus();
     for (const guess of guesses(box)) inputs(guess).forEach((input) => { input.disabled = done; });
-    box.querySelector(".guess-check").textContent = done ? "Guess again" : "Check my guess";
+    button.textContent = done ? "Guess again" : "Check my guess";
   };
   const tally = () => {
     const points = Object.values(kept).map((one) => one.score);
@@ -108,8 +110,9 @@
   };
 
   const check = (box) => {
+    const again = known(box); /* as this page shows it: another one may have checked the same box since */
     read();
-    if (known(box)) {
+    if (again) {
       clear(box);
       keep();
       tally();
@@ -139,7 +142,11 @@
     for (const guess of guesses(box)) {
       slider(guess)?.addEventListener("input", () => { field(guess).value = slider(guess).value; });
       if (slider(guess)) field(guess).addEventListener("input", () => { slider(guess).value = field(guess).value; });
-      field(guess)?.addEventListener("keydown", (event) => { if (event.key === "Enter") check(box); });
+      field(guess)?.addEventListener("keydown", (event) => {
+        if (event.key !== "Enter") return;
+        event.preventDefault(); /* or it would press the button that has the focus by then */
+        check(box);
+      });
       if (guess.dataset.name in kept) { show(guess, kept[guess.dataset.name].guess); tell(guess); }
     }
     lock(box);

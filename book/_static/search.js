@@ -1,5 +1,5 @@
 /* Search that knows the book. Sphinx says which pages have a query's words; this puts them in order and shows a passage of each. Pages of
-   `window.inboundsPages` (book/_ext/search.py): [address, title, kind, phrases, [[anchor, heading, passage], ...]]. Nothing is fetched, so
+   `window.inboundsPages` (book/_ext/search_pages.py): [address, title, kind, phrases, [[anchor, heading, passage], ...]]. Nothing is fetched, so
    that it works from the disk, too. */
 (() => {
   "use strict";

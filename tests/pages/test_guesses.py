@@ -7,6 +7,7 @@ from tests.pages import browser as book
 
 PAGES = book.pages('class="inbounds-guess"')
 CHOICES = [name for name in PAGES if 'data-kind="choice"' in (book.HTML / name).read_text(encoding="utf8")]
+NUMBERS = [name for name in PAGES if 'data-kind="number"' in (book.HTML / name).read_text(encoding="utf8")]
 # Fills in every question of the page's first box, each right or each wrong.
 ANSWER = """right => {
   const guesses = [...document.querySelectorAll('.predict .inbounds-guess')];
@@ -74,6 +75,42 @@ def test_every_box_can_be_answered_right_and_wrong(context: BrowserContext, addr
     page.locator(".guess-check").first.click()  # again
     answered(page, right=False)
     assert all(text.startswith(("Not so", "Off")) for text in page.locator(".guess-result").all_inner_texts())
+
+
+def test_a_box_that_another_page_has_checked_since_is_checked(context: BrowserContext, address: str) -> None:
+    first, second = (context.new_page() for _ in range(2))
+    for page in (first, second):
+        page.goto(address + CHOICES[0])
+    answered(first, right=True)
+    answered(second, right=False)
+    assert all(
+        text.startswith(("Not so", "Off")) for text in second.locator(".guess-result").all_inner_texts()
+    )
+
+
+def test_who_answers_by_the_keyboard_stays_at_the_box(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.goto(address + NUMBERS[0])
+    page.evaluate(ANSWER, True)
+    page.locator(".inbounds-guess input[type=number]").first.press("Enter")
+    assert page.evaluate("document.activeElement.textContent") == "Guess again"
+
+
+def test_copying_the_page_leaves_a_choice_as_it_is(context: BrowserContext, address: str) -> None:
+    page = context.new_page()
+    page.goto(address + CHOICES[0])
+    choice = page.locator(".predict input[type=radio]").first
+    choice.check()
+    copied = page.evaluate(
+        """() => {
+      const copy = new ClipboardEvent('copy', { clipboardData: new DataTransfer(), bubbles: true, cancelable: true });
+      getSelection().selectAllChildren(document.querySelector('article'));
+      document.dispatchEvent(copy);
+      return copy.clipboardData.getData('text/plain');
+    }"""
+    )
+    assert "$" in copied
+    assert choice.is_checked()
 
 
 def test_a_wrong_choice_is_told_why(context: BrowserContext, address: str) -> None:

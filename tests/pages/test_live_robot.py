@@ -182,6 +182,60 @@ def test_a_push_moves_it(reader: BrowserContext, address: str) -> None:
 
 
 @needs_robots
+def test_what_cannot_be_loaded_is_said_and_another_choice_goes_on(
+    reader: BrowserContext, address: str
+) -> None:
+    page = start(reader, address + PAGE)
+    place = robot(page)
+    page.route("**/policies/walker2d-*.js", lambda route: route.abort())
+    place.get_by_label("Robot", exact=True).select_option("Walker2d")
+    page.wait_for_function(
+        "() => document.querySelector('.inbounds-live-robot [aria-live]').textContent.includes('could not be loaded')"
+    )
+    place.get_by_role("button", name="Pause").click()
+    for name in ("Play", "One step", "Same start again"):
+        place.get_by_role("button", name=name).click()
+    place.get_by_label("Robot", exact=True).select_option("Hopper")
+    page.wait_for_function(
+        "() => document.querySelector('.inbounds-live-view').ariaLabel.startsWith('Hopper')"
+    )
+    time = "document.querySelectorAll('.inbounds-live-robot td')[2].textContent"
+    page.wait_for_function(f"() => {time} === '0.00 s'")
+    place.get_by_role("button", name="One step").click()
+    page.wait_for_function(f"() => {time} !== '0.00 s'")
+    assert page.seen == []  # type: ignore[attr-defined]
+
+
+@needs_robots
+def test_a_failed_start_can_be_tried_again_and_the_keyboard_stays(
+    reader: BrowserContext, address: str
+) -> None:
+    page = reader.new_page()
+    page.route("**/live/three.js*", lambda route: route.abort(), times=1)
+    page.goto(address + PAGE)
+    ask = robot(page).locator(".inbounds-live-ask button")
+    ask.press("Enter")
+    page.wait_for_function(READY)
+    assert "could not be started" in robot(page).locator(".inbounds-live-why").inner_text()
+    ask.press("Enter")
+    page.wait_for_function("() => document.querySelector('.inbounds-live-robot').dataset.state === 'live'")
+    assert page.evaluate("document.activeElement.textContent") == "Pause"
+
+
+@needs_robots
+def test_another_noise_is_drawn_while_it_waits(reader: BrowserContext, address: str) -> None:
+    page = start(reader, address + PAGE)
+    first = robot(page).locator(".inbounds-live-one").first
+    robot(page).get_by_role("button", name="Pause").click()
+    page.wait_for_timeout(300)
+    drawn = "() => document.querySelector('.inbounds-live-one canvas[role=img]').toDataURL()"
+    before = page.evaluate(drawn)
+    first.get_by_label("noise ×").fill("0.3")
+    page.wait_for_timeout(300)
+    assert page.evaluate(drawn) != before
+
+
+@needs_robots
 def test_it_rests_off_screen(reader: BrowserContext, address: str) -> None:
     page = start(reader, address + PAGE)
     page.evaluate("document.querySelector('.inbounds-live-robot').style.marginTop = '4000px'; scrollTo(0, 0)")

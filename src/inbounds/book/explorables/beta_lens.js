@@ -96,7 +96,7 @@ inbounds.models["beta-lens"] = ({ log_alpha, log_beta }) => {
   const { alpha: byAlpha, beta: byBeta, sigma: bySigma } = paths(alpha, beta, mu);
   const ends = [byAlpha, byBeta, bySigma].map((path) => [path.x.at(-1), path.y.at(-1)]);
 
-  const number = (v, digits = 3) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 3) => inbounds.numerics.number(v, digits);
   const named = (values) => Object.entries(values).map(([name, v]) => `${name}\u00a0${number(v, 2)}`).join(", ");
   const [least, most] = [Math.min(alpha, beta), Math.max(alpha, beta)];
   const mode =

@@ -33,7 +33,7 @@ inbounds.models["bounded-densities"] = ({ mu, log_sigma }) => {
   };
   const highest = Math.max(...Object.values(curves).flatMap((curve) => curve.y));
 
-  const number = (v, digits = 2) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 2) => inbounds.numerics.number(v, digits);
   const inside = (a) => { // with so many digits that it is not written as a bound
     let digits = 3;
     while (Math.abs(a) < 1 && Math.abs(Number(a.toFixed(digits))) === 1) digits++;

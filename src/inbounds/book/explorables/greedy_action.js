@@ -25,8 +25,7 @@ inbounds.models["greedy-action"] = ({ mu, log_sigma }) => {
     mode: bend > 1e-6 ? slope(latentMode) / bend : Infinity,
   };
 
-  const number = (v, digits = 3) =>
-    Number.isFinite(v) ? v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−") : "∞";
+  const number = (v, digits = 3) => inbounds.numerics.number(v, digits);
   const names = ["mean", "median", "mode"];
   const cells = (read) => names.map((name) => number(read(name)));
   const absolute = (c) => expectation((z) => Math.abs(squash(z) - c), mu, sigma, 4001);

@@ -170,7 +170,7 @@ inbounds.models["greenhouse-by-hand"] = ({ which, night, day, gain, opens }) => 
   }
   const temperatures = [yours, chapter].flatMap((each) => [...each.inside, ...each.outside]);
 
-  const number = (v, digits = 1) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 1) => inbounds.numerics.number(v, digits);
   const cells = (read) => names.map((name) => read(found[name]));
   const atBound = (v, low, high) => Math.min(v - low, high - v) <= 0.001 * (high - low); // or within 0.1 % of one
   const share = (values, low, high) =>

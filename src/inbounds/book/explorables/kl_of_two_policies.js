@@ -14,7 +14,7 @@ inbounds.models["kl-of-two-policies"] = ({ mu_old, log_sigma_old, mu_new, log_si
   ];
   const maps = ["gaussian", "logit-normal", "clipped-gaussian"];
 
-  // Points that follow the mass of both laws; `inside` are those that the clip leaves where they are.
+  // Points that follow the mass of both laws, beside some that are evenly spread.
   const spread = (transform, even) => {
     const points = new Set(even);
     for (const { mu, sigma } of pair) for (let t = -8; t <= 8; t += 0.01) points.add(transform(mu + sigma * t));
@@ -37,14 +37,16 @@ inbounds.models["kl-of-two-policies"] = ({ mu_old, log_sigma_old, mu_new, log_si
     "clipped-gaussian": pair.map(({ mu, sigma }) => clippedGaussian(mu, sigma)),
   };
 
-  // Sum over the bounds of f(log p, log q), plus its integral between them by the trapezoid rule on the drawn curves. Of
-  // logarithms: far out a density is lost in rounding where its logarithm still counts.
+  // Sum over the bounds of f(log p, log q), plus its integral between them by Gauss's two points in each step of the drawn
+  // curves. Of logarithms: far out a density is lost in rounding where its logarithm still counts.
   const integrate = (map, f) => {
     const x = grids[map];
     const [p, q] = laws[map];
-    const y = x.map((a) => f(p.logDensity(a), q.logDensity(a)));
     let sum = p.logAtLow === undefined ? 0 : f(p.logAtLow, q.logAtLow) + f(p.logAtHigh, q.logAtHigh);
-    for (let i = 1; i < x.length; i++) sum += 0.5 * (y[i] + y[i - 1]) * (x[i] - x[i - 1]);
+    for (let i = 1; i < x.length; i++) {
+      const [middle, half] = [0.5 * (x[i] + x[i - 1]), 0.5 * (x[i] - x[i - 1])];
+      for (const a of [middle - half / Math.sqrt(3), middle + half / Math.sqrt(3)]) sum += half * f(p.logDensity(a), q.logDensity(a));
+    }
     return sum;
   };
   const divergence = (p, q) => Math.exp(p) * (p - q);
@@ -62,7 +64,7 @@ inbounds.models["kl-of-two-policies"] = ({ mu_old, log_sigma_old, mu_new, log_si
     ]),
   );
 
-  const number = (v, digits = 3) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 3) => inbounds.numerics.number(v, digits);
   // Which of the last rows differ from map to map, in the digits that are shown.
   const moved = [["entropy", "entropies"], ["mean", "means"]]
     .filter(([key]) => [0, 1].some((i) => new Set(maps.map((map) => number(results[map][key][i]))).size > 1))

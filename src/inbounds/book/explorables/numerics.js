@@ -16,6 +16,10 @@ inbounds.numerics = (() => {
   const normalPdf = (x) => Math.exp(-0.5 * x * x - LOG_SQRT_2PI);
   const logNormalPdf = (x, mu, sigma) => -0.5 * ((x - mu) / sigma) ** 2 - LOG_SQRT_2PI - Math.log(sigma);
 
+  // A number as the page writes it: so many decimals, a true minus, and none before zero.
+  const number = (v, digits) =>
+    Number.isFinite(v) ? v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−") : v > 0 ? "∞" : "−∞";
+
   // Series of Marsaglia (2004), Evaluating the Normal Distribution, Journal of Statistical Software 11(4).
   function normalCdf(x) {
     if (Math.abs(x) > 9) return x > 0 ? 1 : 0;
@@ -178,7 +182,7 @@ inbounds.numerics = (() => {
   }
 
   return {
-    normalPdf, normalCdf, logNormalPdf, logNormalCdf, logGamma, betaCdf, bisect, expectation,
+    number, normalPdf, normalCdf, logNormalPdf, logNormalCdf, logGamma, betaCdf, bisect, expectation,
     logitNormal, logitNormalLatentModes, clippedGaussian, matchedBeta,
   };
 })();

@@ -96,7 +96,7 @@ inbounds.models["one-batch"] = ({ steps, draws, noise, batch }) => {
     paid[0] + Math.min(1, (0.3 * SIGMA * normalPdf((x - mu) / sigma)) / (sigma * normalPdf(0))) * (paid[1] - paid[0]);
   const fine = [...a, ...a.map((x) => now.mu + 3 * x * now.sigma)].filter((x) => Math.abs(x) <= 2).sort((x, y) => x - y);
 
-  const number = (v, digits = 2) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 2) => inbounds.numerics.number(v, digits);
   const cells = (key, digits) => [now, early].map((at) => number(at[key], digits));
   const short = (v) => (v < 10 ? v.toPrecision(2) : number(v, 0));
   const impossible = now.promise > most;

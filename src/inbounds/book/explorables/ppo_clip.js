@@ -30,7 +30,7 @@ inbounds.models["ppo-clip"] = ({ ratio, advantage, clip_range }) => {
     sources[name] = { x: [at, at], y: range };
   });
 
-  const number = (v) => v.toFixed(2).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v) => inbounds.numerics.number(v, 2);
   const cells = (read) => names.map((name) => number(read(name)));
   const side = inside(ratio) ? 0 : Math.sign(ratio - 1); // −1: below 1 − ε, 0: inside, 1: above 1 + ε
   const atEdge = side !== 0 && Math.abs(Math.abs(ratio - 1) - clip_range) < 1e-9;

@@ -120,7 +120,7 @@ inbounds.models["reinforce-step"] = ({ peak, draws, batch, share, rate }) => {
     y: round.map((t) => gradient[1] + scale * (mixed * Math.cos(t) + second * Math.sin(t))),
   };
 
-  const number = (v) => v.toFixed(3).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v) => inbounds.numerics.number(v, 3);
   const steps = [ours, gradient].map((each) => each.map((v) => number(rate * v)));
   const verb = (value) => (value > before + 5e-4 ? "raises" : value < before - 5e-4 ? "lowers" : "hardly changes");
   const bare = exact(peak, 0).covariance[0];

@@ -85,12 +85,13 @@ inbounds.models["score-estimators"] = ({ mu, log_sigma, peak, share }) => {
   const ranges = { mean: span("mean"), std: span("std") };
   for (const key of ["mean", "std"]) sources[`at-${key}`] = { x: [mu, mu], y: ranges[key] };
 
-  const number = (v) => v.toFixed(3).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v) => inbounds.numerics.number(v, 3);
   const cells = (read) => names.map((name) => number(read(name)));
   const { clipped, capg } = here.loc;
   const seen = Math.min(Math.abs(clipped.mean), Math.abs(capg.mean)) >= 0.0005; // not what is zero but for rounding
   const wrong = clipped.mean - capg.mean;
   const opposite = seen && clipped.mean * capg.mean < 0;
+  const varies = here.loc.drawn.std >= 0.0005;
   const saved = 1 - (capg.std / here.loc.drawn.std) ** 2;
   const percent = (p) => (p > 0 && p < 0.0005 ? "less than 0.1 %" : `${(100 * p).toFixed(1)} %`);
   return {
@@ -108,7 +109,9 @@ inbounds.models["score-estimators"] = ({ mu, log_sigma, peak, share }) => {
       `At μ = ${number(mu)} and σ = ${number(sigma)}, ${percent(here.loc.outside)} of the draws leave the box, and the ` +
       `mean reward is ${number(here.loc.value)}. The score at the clipped action is off by ${number(wrong)} in μ` +
       (opposite ? ": it points the wrong way. " : ". ") +
-      `CAPG's variance in μ is ${percent(saved)} below that of the score at the drawn action.`,
+      (varies
+        ? `CAPG's variance in μ is ${percent(saved)} below that of the score at the drawn action.`
+        : "No estimator varies in μ by as much as 0.0005."),
     here, // for the tests
   };
 };

@@ -35,8 +35,7 @@ inbounds.models["stored-action"] = ({ z, noise, log_sigma, form }) => {
   const stem = (at) => (Number.isFinite(at) ? { x: [at, at], y: [0, density(at)] } : { x: [], y: [] });
   const ring = (at) => (Number.isFinite(at) ? { x: [at], y: [density(at)] } : { x: [], y: [] });
 
-  const number = (v, digits = 3) =>
-    Number.isFinite(v) ? v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−") : v > 0 ? "∞" : "−∞";
+  const number = (v, digits = 3) => inbounds.numerics.number(v, digits);
   const short = (v) => {
     if (v === 0) return "0";
     if (v >= 0.01 && v < 1e6) return number(v, v >= 100 ? 0 : 3);

@@ -86,7 +86,7 @@ inbounds.models["trust-region"] = ({ log_sigma, peak, log_max_kl }) => {
   const far = (4 * half) / Math.hypot(...found.b);
   sources.level = { x: [x - far * found.b[1], x + far * found.b[1]], y: [y + far * found.b[0], y - far * found.b[0]] };
 
-  const number = (v, digits = 4) => v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−");
+  const number = (v, digits = 4) => inbounds.numerics.number(v, digits);
   const cells = (read) => names.map((name) => number(read(found[name])));
   const share = (kept) => (kept === 1 ? "all" : kept ? `1/${1 / kept}` : "nothing");
   const cost = 1 / (2 * sigma * sigma);

@@ -300,7 +300,6 @@ def _curve(place: Place, cells: Sequence[Outcome]) -> dict[str, Any]:
         "family": family,
         "name": SHORT[family] + which.get((place.start, family), ""),
         "thin": place.stands_in,
-        "seeds": band.n,
         "told": {endpoint: spoken(pooled_estimate(cells, endpoint)) for endpoint in ENDPOINTS},
         **{
             name: [_short(float(x), 4) for x in np.asarray(values)[kept]]

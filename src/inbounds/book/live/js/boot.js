@@ -44,26 +44,29 @@ inbounds.live ??= {};
     live.started ??= (async () => {
       for (const part of ["engine", "wasm", "three", "catalogue", ...PARTS]) await live.load(`${part}.js`);
       const wasmBinary = new Uint8Array(await live.unpack(live.wasm));
+      const mujoco = await live.engine.load({ wasmBinary, print: console.debug, printErr: console.debug });
       delete live.wasm;
-      return live.engine.load({ wasmBinary, print: console.debug, printErr: console.debug });
+      return mujoco;
     })();
     live.started.catch(() => delete live.started); // so that the reader can try again
     return live.started;
   };
 
   async function ask(element, button, says) {
-    button.disabled = true;
+    if (element.dataset.state === "loading") return;
+    element.dataset.state = "loading";
     says.textContent = "Loading MuJoCo and the policies …";
     try {
       const mujoco = await live.start();
-      await new live.Show(element, mujoco).open();
+      const show = new live.Show(element, mujoco);
+      await show.open();
       says.textContent = "";
+      if (document.activeElement === button) show.play.focus();
       button.hidden = true;
       element.dataset.state = "live";
     } catch (error) {
       element.dataset.state = "film";
       says.textContent = `The robots could not be started here (${error.message}); the film stays.`;
-      button.disabled = false;
     }
   }
 

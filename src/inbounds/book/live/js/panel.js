@@ -26,7 +26,7 @@ inbounds.live.Panel = class {
       "noise ×",
       { min: 0, max: 3, step: 0.05, value: 1, text: (x) => x.toFixed(2) },
       (value) => {
-        if (this.player) this.player.spread = value;
+        this.player?.widen(value);
         show.redraw();
       },
     );

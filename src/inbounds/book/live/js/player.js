@@ -28,9 +28,16 @@ inbounds.live.Player = class {
   // Choose the next action. Noise is drawn whether it is used or not, so that both players stay in step.
   decide() {
     const noise = this.noise.normals(this.policy.low.length);
-    this.parameters = this.policy.parameters(this.world.observe(), this.spread);
+    this.seen = this.world.observe();
+    this.parameters = this.policy.parameters(this.seen, this.spread);
     this.told = this.policy.act(this.parameters, this.way, noise);
     this.world.tell(this.policy.inBox(this.told.executed));
+  }
+
+  // Let the noise be so many times as large from the next action on; the law that it will have is there at once.
+  widen(spread) {
+    this.spread = spread;
+    this.parameters = this.policy.parameters(this.seen, spread);
   }
 
   // One step of the physics; true when a step of the environment is complete.

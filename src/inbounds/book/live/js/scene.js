@@ -10,7 +10,6 @@ inbounds.live.Scene = class {
     this.canvas = canvas;
     this.world = world;
     this.renderer = new three.WebGLRenderer({ canvas, antialias: true, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.scene = new three.Scene();
     this.camera = new three.PerspectiveCamera(45, 4 / 3, 0.05, 100);
     this.camera.up.set(0, 0, 1);
@@ -102,11 +101,14 @@ inbounds.live.Scene = class {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (!width || (this.canvas.width === Math.round(width * this.renderer.getPixelRatio()) && this.drawn)) return;
+    const ratio = Math.min(devicePixelRatio, 2);
+    const size = [width, height, ratio].join();
+    if (!width || !height || size === this.size) return;
+    this.size = size;
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.drawn = true;
   }
 
   look() {
@@ -139,7 +141,7 @@ inbounds.live.Scene = class {
     this.renderer.render(this.scene, this.camera);
   }
 
-  // An arrow where the reader pushes, as long as half a metre for a force of the robot's weight.
+  // An arrow where the reader pushes, 0.8 m long for a force of the robot's weight.
   drawPush() {
     const { pushed, totalMass, data } = this.world;
     this.arrow.visible = Boolean(pushed);

@@ -1,7 +1,7 @@
 // One or two robots on one clock, and the controls that both share.
 "use strict";
 
-// The policy of a cell's seed. Only its own file is loaded, and forgotten once it has been read.
+// The policy of a cell's seed. Only its own file is loaded, once a page.
 inbounds.live.policyOf = async (robot, policy, seed, untrained) => {
   const { live } = inbounds;
   await live.load(`robots/${robot}.js`);
@@ -20,7 +20,7 @@ inbounds.live.policyOf = async (robot, policy, seed, untrained) => {
 inbounds.live.Show = class {
   static SPEEDS = { 1: "real time", 0.5: "half speed", 0.25: "quarter speed", 0.1: "a tenth" };
   static PAUSE = 1.5; // seconds between two episodes
-  static EVERY = 10; // seconds between two sentences to a screen reader
+  static EVERY = 10; // seconds of the reader's time between two sentences to a screen reader
   static PUSH = 0.2; // seconds that a push lasts
 
   constructor(element, mujoco) {
@@ -105,21 +105,26 @@ inbounds.live.Show = class {
   // Another robot, seed or policy: bring it in and start anew. Changes that come meanwhile wait for their turn.
   change(first = false) {
     const { policies } = inbounds.live.catalogue;
-    this.changing = (this.changing ?? Promise.resolve()).then(async () => {
+    const before = (this.changing ?? Promise.resolve()).catch(() => {}); // what failed was said, and is over
+    this.changing = before.then(async () => {
       this.busy = true;
-      for (const [i, panel] of this.panels.entries()) {
-        panel.which.fill(i ? { "": "none", ...policies } : policies, panel.policy);
-        await panel.open(this.mujoco, this.robot, this.seed, this.untrained);
+      try {
+        for (const [i, panel] of this.panels.entries()) {
+          panel.which.fill(i ? { "": "none", ...policies } : policies, panel.policy);
+          await panel.open(this.mujoco, this.robot, this.seed, this.untrained);
+        }
+      } catch (error) {
+        for (const panel of this.panels) panel.close();
+        throw error;
+      } finally {
+        this.busy = false;
       }
-      this.busy = false;
       this.restart(this.start);
       this.wake();
     });
     if (first) return this.changing;
     return this.changing.catch((error) => {
-      this.busy = false;
-      this.says.textContent = `That could not be loaded (${error.message}).`;
-      this.changing = null;
+      this.says.textContent = `That could not be loaded (${error.message}): choose another.`;
     });
   }
 
@@ -129,7 +134,10 @@ inbounds.live.Show = class {
 
   restart(start) {
     this.start = start;
-    for (const player of this.players) player.reset(start);
+    for (const player of this.players) {
+      player.world.pushed = null;
+      player.reset(start);
+    }
     Object.assign(this, { owed: 0, rest: inbounds.live.Show.PAUSE, silence: 0, told: false, pushing: 0 });
     this.redraw();
   }
@@ -142,7 +150,7 @@ inbounds.live.Show = class {
   }
 
   get runs() {
-    return this.playing && this.visible && !document.hidden && !this.busy;
+    return this.playing && this.visible && !document.hidden && !this.busy && this.players.length > 0;
   }
 
   wake() {
@@ -156,7 +164,7 @@ inbounds.live.Show = class {
     const seconds = Math.min(Math.max(now - this.last, 0), 100) / 1000;
     this.last = now;
     if (this.runs) this.run(seconds * this.rate);
-    this.draw();
+    if (!this.busy) this.draw();
     if (this.runs) this.frame = requestAnimationFrame((next) => this.tick(next));
   }
 
@@ -170,7 +178,7 @@ inbounds.live.Show = class {
       this.advance();
     }
     this.owed = Math.min(this.owed, 2 * world.dt);
-    this.silence += seconds;
+    this.silence += seconds / this.rate;
     if (this.silence > inbounds.live.Show.EVERY) this.speak();
     if (!this.players.every((player) => player.over)) return;
     if (!this.told) this.speak();
@@ -191,6 +199,7 @@ inbounds.live.Show = class {
   // One step of the environment, while paused.
   step() {
     if (this.playing) this.setPlaying(false);
+    if (this.busy || !this.players.length) return;
     const { frame_skip: count } = this.players[0].world.task;
     for (let i = 0; i < count; i++) this.advance();
     this.redraw();
@@ -213,7 +222,7 @@ inbounds.live.Show = class {
 
   speak() {
     this.silence = 0;
-    if (this.busy) return;
+    if (this.busy || !this.players.length) return;
     this.says.textContent = this.panels.filter((panel) => panel.player).map((panel) => panel.sentence()).join(" ");
   }
 
