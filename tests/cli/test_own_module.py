@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from inbounds.cli import main
 from inbounds.learning.storage.run_store import load_checkpoint
 from tests.cli.small import SMALL
 
@@ -113,6 +114,12 @@ def test_what_an_environment_raises_is_told_with_its_place(fault: str, said: str
     assert done.returncode == 1
     assert said in done.stderr
     assert 'my_arm.py", line' in done.stderr
+
+
+@pytest.mark.parametrize("env", [":", ":Env-v0", "my_arm:", "my_arm::Env-v0"])
+def test_half_an_environment_is_refused(env: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["train", env, *SMALL]) == 2
+    assert f"{env!r} is no environment: give an id, or module:id. The tasks are" in capsys.readouterr().err
 
 
 def test_nan_observations_are_no_matter_of_the_learning_rate(folder: Path) -> None:

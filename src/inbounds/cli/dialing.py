@@ -12,8 +12,9 @@ import tyro
 from rich.console import Console
 from tyro.conf import subcommand
 
+from inbounds.cli.errors import CommandError
 from inbounds.learning.storage.whole_files import DamagedFileError
-from inbounds.study.dial.cells import dial_cells
+from inbounds.study.dial.cells import EPOCHS, dial_cells
 from inbounds.study.dial.outcomes import DialOutcomes, constant_guess, tally
 from inbounds.study.dial.running import DialFolder, run_cells, wrong_cells
 from inbounds.study.dial.theory import MODELS
@@ -125,6 +126,10 @@ def _do(command: DialCommand, console: Console) -> int:
     elif isinstance(command, Show):
         _show(DialOutcomes(folder.read()), say)
     else:
+        if command.random < 1 or not 1 <= command.epochs <= EPOCHS:
+            raise CommandError(
+                f"--random takes 1 or more cells, and --epochs 1 to {EPOCHS} of their epochs", 2
+            )
         chosen = random.Random(command.random_seed).sample(cells, min(command.random, len(cells)))
         wrong = wrong_cells(folder, cells=chosen, epochs=command.epochs)
         for cell in chosen:

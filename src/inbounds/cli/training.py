@@ -200,7 +200,9 @@ def _check_environment(config: TrainConfig) -> None:
     """Raise unless the environment can be made; say what to ask for instead."""
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
     try:
-        if module_of(config.env):
+        if module_of(config.env) is not None:
+            if [bool(part) for part in config.env.split(":")] != [True, True]:
+                raise CommandError(f"{config.env!r} is no environment: give an id, or module:id. {tasks}", 2)
             find_modules_here()
         envs = make_environments(config, 1)
         check_environments(envs, 1)

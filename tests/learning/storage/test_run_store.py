@@ -1,6 +1,9 @@
+import copy
 import json
 import os
+import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -23,6 +26,7 @@ from inbounds.learning.storage.run_store import (
     read_curves,
     save_run,
 )
+from inbounds.learning.storage.trained_policy import TrainedPolicy
 from inbounds.learning.storage.whole_files import DamagedFileError, write_whole
 from tests.learning.small import ALGORITHMS, FAMILIES, rng, small_config, small_run
 
@@ -76,6 +80,49 @@ def test_policies_come_back_bit_for_bit(family: str, tmp_path: Path) -> None:
             a, b = (policy.act(obs, greedy, rng(1)) for policy in (before, after))
             assert np.array_equal(a, b)
             assert (np.abs(a) <= 1).all()
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])
+def test_a_copy_acts_as_its_original_and_has_weights_of_its_own(duplicate: Any, tmp_path: Path) -> None:
+    saved_run(tmp_path, family="beta")
+    policy, obs = load_policy(tmp_path), rng().normal(size=(4, 3))
+    twin, before = duplicate(policy), policy.act(obs)
+    assert np.array_equal(twin.act(obs), before)
+    assert str(twin) == str(policy)
+    twin._network.theta.zero_()
+    assert np.array_equal(policy.act(obs), before)
+    assert not np.array_equal(twin.act(obs), before)
+
+
+def test_no_states_have_no_actions(tmp_path: Path) -> None:
+    saved_run(tmp_path, family="beta")
+    policy, none = load_policy(tmp_path), np.empty((0, 3))
+    for way in policy.greedy_choices:
+        assert policy.act(none, way).shape == (0, 2)
+    assert policy.distribution(none).batch_shape == (0, 2)
+
+
+def test_a_diverged_policy_stays_in_the_middle_though_some_weights_are_finite(tmp_path: Path) -> None:
+    trainer = saved_run(tmp_path, family="gaussian")
+    tensors = trainer.tensors()
+    tensors["policy.2.bias"][0, 0] = np.nan  # of the first motor alone
+    tensors["diverged"][0] = True
+    policy = TrainedPolicy.from_tensors(trainer.config, tensors, 0)
+    for way in policy.greedy_choices:
+        assert policy.act(rng().normal(size=3), way).tolist() == [0.0, 0.0]
+
+
+def test_a_file_that_may_not_be_read_is_not_called_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved_run(tmp_path, family="beta")
+
+    def refuse(path: Path, mode: str) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(PermissionError, match="policies"):
+        load_policies(tmp_path)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from inbounds.cli import main
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.dial import running
 from inbounds.study.dial.cells import PILOT_SEEDS, POLICIES, SEEDS, DialCell, dial_cells
@@ -133,3 +134,21 @@ def test_the_shipped_map_is_repeated() -> None:
     folder = DialFolder.shipped()
     assert wrong_cells(folder, cells=[DialCell("beta", 1.5), DialCell("gaussian-free", 0.25, "raw", 8)]) == []
     assert wrong_cells(folder, cells=[DialCell("logit-normal", 0.9, "executed")], epochs=1) == []
+
+
+@pytest.mark.parametrize("words", [["--epochs", "0"], ["--epochs", "41"], ["--random=-1"]], ids=str)
+def test_a_check_of_nothing_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "dial", "verify", *words]) == 2
+    assert "--epochs 1 to 40" in capsys.readouterr().err
+
+
+def test_a_cell_or_a_checksum_that_is_cut_short_is_called_damaged(folder: DialFolder) -> None:
+    folder.work.mkdir()
+    folder.results.mkdir()
+    folder.cell_file(SMALL[0]).write_bytes(b"")
+    with pytest.raises(DamagedFileError, match="delete it, and run the command again"):
+        folder.finished(SMALL[0])
+    folder.map_file.write_bytes(b"PAR1")
+    (folder.results / "checksums.txt").write_text("")
+    with pytest.raises(DamagedFileError, match="git checkout"):
+        folder.read()

@@ -1,4 +1,5 @@
 import io
+import math
 import os
 import re
 import signal
@@ -8,6 +9,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pytest
@@ -310,6 +312,14 @@ def test_failures_are_reported_and_the_others_go_on(tmp_path: Path) -> None:
 def test_no_cell_is_started_when_time_is_up(tmp_path: Path) -> None:
     folder, cells = folder_in(tmp_path), cells_of(1)
     assert run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0]).reports == {}
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"jobs": 0}, {"nice": 20}, {"max_minutes": math.nan}, {"max_minutes": -1.0}], ids=str
+)
+def test_settings_that_mean_nothing_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
+        Settings(**wrong)
 
 
 def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

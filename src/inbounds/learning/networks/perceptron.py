@@ -11,7 +11,6 @@ the layers are views: an optimiser steps on one tensor, and a seed's gradient is
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
 from collections.abc import Sequence
@@ -125,9 +124,14 @@ class Mlp:
         self.layers = [SeedLinear(*pair) for pair in zip(weights, biases, strict=True)]
         self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy or a pickle have weights of its own, and no gradients."""
+        return _with_weights, (type(self), self.sizes, self.theta)
+
     def seed(self, index: int) -> Self:
         """Return the perceptron of one seed, S = 1, which has its weights in common with these."""
-        row, one = slice(index, index + 1), copy.copy(self)
+        row, one = slice(index, index + 1), object.__new__(type(self))
+        one.__dict__.update(self.__dict__)
         one.padded, one.theta = self.padded[row], self.theta[row]
         one.padded.grad = None if self.padded.grad is None else self.padded.grad[row]
         one.parameters = [part.detach()[row].requires_grad_() for part in self.parameters]
@@ -197,3 +201,9 @@ def initialize_orthogonal(
             last = i == len(net.layers) - 1
             torch.nn.init.orthogonal_(layer.weight[s], head_gain if last else gain, generator=generator)
             layer.bias[s].zero_()
+
+
+def _with_weights(kind: type[Mlp], sizes: tuple[int, ...], theta: Tensor) -> Mlp:
+    net = kind(len(theta), sizes, theta.dtype)
+    net.theta.copy_(theta)
+    return net

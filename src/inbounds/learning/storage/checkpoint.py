@@ -63,7 +63,7 @@ def load(path: Path) -> dict[str, Any]:
 
 def _to_tensors(tree: Any) -> Any:
     if isinstance(tree, np.ndarray):
-        return {"__ndarray__": torch.from_numpy(np.ascontiguousarray(tree)).clone()}
+        return {"__ndarray__": torch.from_numpy(np.asarray(tree, order="C")).clone()}
     if isinstance(tree, np.generic):
         return tree.item()
     if isinstance(tree, dict):

@@ -202,6 +202,7 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
         <TrainedPolicy: logit-normal, ppo, Hopper-v5, seed 1>
     """
     path = find(run, POLICIES_FILE)
+    path.open("rb").close()  # safetensors says of a file that may not be read that there is none
     try:
         with safetensors.safe_open(path, "np") as file:
             metadata = json.loads((file.metadata() or {})[METADATA_KEY])

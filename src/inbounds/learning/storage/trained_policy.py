@@ -51,6 +51,11 @@ class TrainedPolicy:
         self._policy = Policy(config.policy, low, high)
         self._dtype = np.dtype(config.network.dtype)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a policy be copied, and pickled for another process."""
+        parts = self.config, self.seed, self.diverged, self._network, self._normalizer, self.low, self.high
+        return type(self), parts
+
     @classmethod
     def from_tensors(
         cls, config: TrainConfig, tensors: Mapping[str, NDArray[Any]], index: int
@@ -112,6 +117,8 @@ class TrainedPolicy:
                 does not offer.
         """
         outputs, shape = self._outputs(obs)
+        if greedy == "sample" and not len(outputs):
+            return np.empty(shape, self._policy.dtype)
         if greedy == "sample":
             rng = np.random.default_rng() if rng is None else rng
             action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
@@ -146,7 +153,7 @@ class TrainedPolicy:
             ('LogitNormal', (5, 3), (5,))
         """
         outputs, shape = self._outputs(obs)
-        return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], -1))
+        return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], outputs.shape[-1]))
 
     def _outputs(self, obs: NDArray[Any]) -> tuple[NDArray[Any], tuple[int, ...]]:
         """Return the network's outputs `[B, 2A]` and the shape that actions for `obs` have."""
@@ -164,6 +171,10 @@ class TrainedPolicy:
         batch = np.atleast_2d(obs)  # [B, O]
         seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
         outputs = self._network.act(seen)  # the weights of one seed serve every row
+        if self.diverged:
+            outputs = np.full_like(
+                outputs, np.nan
+            )  # weights that are still finite would move some of the motors
         return outputs, (*obs.shape[:-1], len(self.low))
 
 

@@ -23,7 +23,7 @@ from inbounds.learning import Trainer, train
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_metadata import METADATA_KEY
 from inbounds.learning.storage.stored_config import changed_fields, describe
-from inbounds.learning.storage.whole_files import DamagedFileError, held, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, damaged, held, write_whole
 from inbounds.study.dial.cells import DialCell, dial_cells
 from inbounds.study.dial.task import DialEnv
 from inbounds.study.running.provenance import provenance
@@ -63,7 +63,10 @@ class DialFolder:
         path = self.cell_file(cell)
         if not path.is_file():
             return False
-        stored = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
+        try:
+            stored = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
+        except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
+            raise damaged(path, error, "delete it, and run the command again") from error
         return is_of(cell, stored["config"])
 
     def read(self) -> pa.Table:
@@ -76,7 +79,7 @@ class DialFolder:
         if not self.map_file.is_file():
             raise FileNotFoundError(f"there is no {self.map_file}: make it (inbounds study dial run)")
         line = (self.results / "checksums.txt").read_text()
-        if line.split()[0] != hashlib.sha256(self.map_file.read_bytes()).hexdigest():
+        if line.split()[:1] != [hashlib.sha256(self.map_file.read_bytes()).hexdigest()]:
             raise DamagedFileError(
                 f"{self.map_file} is damaged: restore it (git checkout -- {self.map_file})"
             )

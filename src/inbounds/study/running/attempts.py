@@ -48,6 +48,8 @@ class Settings:
             raise ValueError(f"jobs must be at least 1, got {self.jobs}")
         if not 0 <= self.nice <= 19:
             raise ValueError(f"nice must be between 0 and 19, got {self.nice}")
+        if self.max_minutes is not None and not self.max_minutes >= 0:  # NaN is no number of minutes
+            raise ValueError(f"max_minutes must be 0 or more, got {self.max_minutes}")
 
 
 class CellReport(NamedTuple):
