@@ -9,7 +9,15 @@ from scipy import stats
 from torch.distributions import Beta, Normal, kl_divergence
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
-from inbounds.learning.families import BETA, CLIPPED_NORMAL, NORMAL, BetaParameters, Limits, Parameters
+from inbounds.learning.families import (
+    BETA,
+    CLIPPED_NORMAL,
+    NORMAL,
+    BetaParameters,
+    Limits,
+    NormalParameters,
+    Parameters,
+)
 
 LAWS = {"normal": NORMAL, "clipped": CLIPPED_NORMAL, "beta": BETA}
 real = st.floats(-3, 3)
@@ -150,3 +158,22 @@ def test_latent_ratios_are_action_ratios() -> None:
 def test_limits_are_checked(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must"):
         Limits(**wrong)
+
+
+def test_what_is_recorded_of_parameters() -> None:
+    """Two seeds, one motor: quantiles by sorting, shares by counting."""
+    loc = np.array([np.arange(-50.0, 51.0), np.zeros(101)])[:, :, None]  # [S, T, A]
+    log_scale = np.array([np.linspace(-2.0, 1.0, 101), np.full(101, -2.0)])[:, :, None]
+    told = NORMAL.describe(NormalParameters(loc, log_scale), Limits(log_std_min=-2.0, log_std_max=1.0))
+    assert told["abs_loc_q50"].tolist() == [25.0, 0.0]
+    assert told["abs_loc_q99"].tolist() == [50.0, 0.0]
+    assert told["scale_q50"].tolist() == pytest.approx([math.exp(-0.5), math.exp(-2)])
+    assert told["scale_q99"][0] == pytest.approx(math.exp(1.0 - 0.03))
+    assert told["at_log_std_min"].tolist() == pytest.approx([1 / 101, 1.0])
+    assert told["at_log_std_max"].tolist() == pytest.approx([1 / 101, 0.0])
+    alpha, beta = 1 + np.abs(loc), np.full_like(loc, 3.0)
+    told = BETA.describe(BetaParameters(alpha, beta), Limits(concentration_max=51.0))
+    assert told["alpha_q50"].tolist() == [26.0, 1.0]
+    assert told["beta_q99"].tolist() == [3.0, 3.0]
+    assert told["at_alpha_max"].tolist() == pytest.approx([2 / 101, 0.0])
+    assert told["at_beta_max"].tolist() == [0.0, 0.0]

@@ -18,6 +18,8 @@ from rich.console import Console
 from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
+from inbounds.study.running import many_cells
+from inbounds.study.running.attempts import RETRIES, CellReport
 from inbounds.study.running.cell_lock import CellLock, read_claim
 from inbounds.study.running.many_cells import commit_cell
 from inbounds.study.running.progress import StudyProgress, cell_status, status_table
@@ -314,12 +316,50 @@ def test_no_cell_is_started_when_time_is_up(tmp_path: Path) -> None:
     assert run_study(cells, folder, Settings(max_minutes=0), quiet(cells, folder)[0]).reports == {}
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"jobs": 0}, {"nice": 20}, {"max_minutes": math.nan}, {"max_minutes": -1.0}], ids=str
-)
-def test_settings_that_mean_nothing_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
-        Settings(**wrong)
+def a_pool(
+    cells: list[Cell], folder: StudyFolder, **settings: Any
+) -> tuple[many_cells._LocalRun, io.StringIO]:
+    progress, said = quiet(cells, folder)
+    return many_cells._LocalRun(cells, folder, Settings(jobs=1, **settings), progress), said
+
+
+def test_a_cell_whose_process_dies_again_and_again_is_let_be(tmp_path: Path) -> None:
+    cell, *others = cells_of(1)
+    pool, said = a_pool(others, folder_in(tmp_path))
+    for _ in range(RETRIES):
+        assert pool._death(cell, -signal.SIGKILL) is None
+        assert pool.waiting.popleft() == cell
+    died = pool._death(cell, -signal.SIGKILL)
+    assert died is not None
+    assert died.outcome == "died"
+    assert "SIGKILL" in died.message
+    assert said.getvalue().count("going on from its last checkpoint") == RETRIES
+
+
+def test_a_full_disk_starts_no_other_cell(tmp_path: Path) -> None:
+    cell, *others = cells_of(1)
+    pool, said = a_pool(others, folder_in(tmp_path))
+    pool._report(cell, CellReport("failed", "a fault"))
+    assert list(pool.waiting) == others
+    pool._report(cell, CellReport("disk full", "make room"))
+    assert not pool.waiting
+    assert "make room" in said.getvalue()
+
+
+@pytest.mark.parametrize("commit", [False, True])
+def test_only_what_has_just_been_finished_is_committed(
+    commit: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    committed: list[Cell] = []
+    monkeypatch.setattr(
+        many_cells, "commit_cell", lambda cell, folder: committed.append(cell) or "git said no"
+    )
+    finished, known, stopped = cells_of(1)
+    pool, said = a_pool([], folder_in(tmp_path), commit=commit)
+    for cell, outcome in ((finished, "finished"), (known, "was finished"), (stopped, "stopped")):
+        pool._report(cell, CellReport(outcome))
+    assert committed == ([finished] if commit else [])
+    assert ("git said no" in said.getvalue()) == commit
 
 
 def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -372,7 +412,9 @@ def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFi
     assert "go to the source tree" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("settings", [{"jobs": 0}, {"nice": 20}])
-def test_settings_are_checked(settings: dict[str, int]) -> None:
-    with pytest.raises(ValueError, match=r"must be"):
-        Settings(**settings)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    "wrong", [{"jobs": 0}, {"nice": 20}, {"max_minutes": math.nan}, {"max_minutes": -1.0}], ids=str
+)
+def test_settings_are_checked(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
+        Settings(**wrong)

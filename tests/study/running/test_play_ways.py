@@ -19,6 +19,8 @@ from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import Cell, StudyFolder, read_cell, run_cell, store
 from inbounds.study.running import check_ways as checks
 from inbounds.study.running import evaluate, play_ways
+from inbounds.study.running.measure import FIRST_STEPS
+from inbounds.study.running.play_records import records_of
 from inbounds.study.running.play_ways import evaluate_cells, final_starts, play_cell
 from inbounds.study.running.verify import check_sums
 from inbounds.study.ways_played import (
@@ -99,6 +101,51 @@ def test_bang_bang_is_the_median_at_the_nearer_bound(done: StudyFolder) -> None:
     for way in ("median-snapped", "sample-snapped"):
         assert (played[way].actions["at_bounds"] == 1).all()
         assert (played[way].actions["abs_q05"] == 1).all()
+
+
+@pytest.fixture(scope="module")
+def hoppers(short_episodes: None, tmp_path_factory: pytest.TempPathFactory) -> tuple[Cell, StudyFolder]:
+    """Untrained hoppers, which fall before the limit at full torque."""
+    cell = dataclasses.replace(cell_of("logit-normal"), robot="Hopper")
+    folder = folder_in(tmp_path_factory.mktemp("hoppers"))
+    run_cell(cell, folder)
+    return cell, folder
+
+
+def test_an_episode_ends_where_the_robot_falls(hoppers: tuple[Cell, StudyFolder]) -> None:
+    """By Gymnasium's robot, one policy and start at a time."""
+    cell, folder = hoppers
+    players = play_ways.WatchedPlayers(play_ways.run_with_policies(cell, folder), 5)
+    rows = iter(players.rows("median-snapped"))
+    players.close()
+    env, lengths = gymnasium.make("Hopper-v5", max_episode_steps=LIMIT), []
+    for policy in load_policies(folder.policy_files(cell)[0]):
+        for start in final_starts(policy.seed)[:5]:
+            row, actions, rewards, over = next(rows), [], [], False
+            obs, _ = env.reset(seed=int(start))
+            while not over:
+                actions.append(np.where(policy.act(obs) < 0, -1.0, 1.0))
+                obs, reward, fallen, late, _ = env.step(actions[-1])
+                rewards.append(float(reward))
+                over = fallen or late
+            lengths.append(len(rewards))
+            told = {
+                "length": len(rewards),
+                "return": sum(rewards),
+                "first_reward": sum(rewards[:FIRST_STEPS]),
+            }
+            told |= summary(np.array(actions), len(actions))
+            assert {name: row[name] for name in told} == pytest.approx(told, rel=1e-3, abs=1e-3)
+    assert min(lengths) < LIMIT
+
+
+def test_records_are_of_the_steps_before_the_fall(hoppers: tuple[Cell, StudyFolder]) -> None:
+    cell, folder = hoppers
+    players = play_ways.WatchedPlayers(play_ways.run_with_policies(cell, folder), 1)
+    lengths = [row["length"] for row in players.rows("sample")]
+    players.close()
+    assert [row["steps"] for row in records_of(cell, folder) if row["record"] == "latent, float32"] == lengths
+    assert min(lengths) < LIMIT
 
 
 def test_snapped_samples_are_the_samples_at_their_bounds(done: StudyFolder) -> None:

@@ -37,7 +37,6 @@ inbounds.live.laws = (() => {
       const s = drawable(sigma);
       return [normalCdf((-1 - mu) / s), normalCdf((mu - 1) / s)];
     },
-    describe: ({ mu, sigma }) => `μ ${mu.toFixed(2)}, σ ${sigma.toFixed(2)}`,
   };
 
   const logitNormal = {
@@ -56,7 +55,6 @@ inbounds.live.laws = (() => {
       return ((normalPdf((2 * Math.atanh(unit) - mu) / s) / s) * 2) / (1 - unit * unit);
     },
     beyond: () => [0, 0],
-    describe: gaussian.describe,
   };
 
   const beta = {
@@ -78,7 +76,6 @@ inbounds.live.laws = (() => {
       return Math.exp((alpha - 1) * Math.log((1 + unit) / 2) + (beta - 1) * Math.log((1 - unit) / 2) - logNorm);
     },
     beyond: () => [0, 0],
-    describe: ({ alpha, beta }) => `α ${alpha.toFixed(1)}, β ${beta.toFixed(1)}`,
   };
 
   return { gaussian, beta, "logit-normal": logitNormal };
