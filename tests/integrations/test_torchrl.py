@@ -61,6 +61,14 @@ def test_the_actor_scores_actions_and_the_environment_gets_them(law: type) -> No
     assert torch.allclose(batch["latent_log_prob"].double(), exact.log_prob(action).sum(-1), atol=1e-3)
 
 
+def test_the_network_may_read_other_names() -> None:
+    module = network(LogitNormal)
+    _, acting = bounded_actor(module, LogitNormal, LOW, HIGH, in_keys=("state",))
+    given = observations(3)
+    found = acting(TensorDict(state=given["observation"], batch_size=[3]))
+    assert torch.equal(found["loc"], module(given["observation"])[0])
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_at_the_old_policy_the_loss_has_the_policy_gradient(law: type) -> None:
     actor, acting = bounded_actor(network(law), law, LOW, HIGH)

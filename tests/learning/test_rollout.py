@@ -90,6 +90,8 @@ def test_raw_actions_leave_the_box_and_clipped_ones_do_not() -> None:
     raw, clipped = (collector(action_mode=mode).collect(HORIZON) for mode in ("raw", "clip"))
     assert raw.action.abs().max() > 1
     assert clipped.action.abs().max() == 1
+    executed = raw.action.clamp(-1, 1).numpy()  # the spread of what the motors do, whatever is charged
+    assert np.allclose(raw.action_std, np.sqrt(executed.var(1).mean(1)))
 
 
 def test_observations_are_normalised_by_what_was_seen_so_far() -> None:

@@ -205,6 +205,16 @@ def test_a_run_killed_in_mid_epoch_goes_on_as_if_nothing_had_happened(tmp_path: 
     assert same_records(whole.records, resumed.records)
 
 
+def test_a_checkpoint_is_written_every_so_many_epochs_and_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved: list[int] = []
+    monkeypatch.setattr(checkpoint, "save", lambda path, state: saved.append(len(state["records"])))
+    config = dataclasses.replace(small_config(epochs=5), checkpoint_every=2)
+    train(config, run_dir=tmp_path, make_envs=PointEnv)
+    assert saved == [2, 4, 5]
+
+
 def some_state(epoch: int) -> dict[str, Any]:
     return {"config": {}, "networks": np.arange(3.0), "records": [epoch]}
 

@@ -49,6 +49,7 @@ def test_a_saved_state_goes_on_bit_for_bit(name):
     obs = resumed.set_state(pickle.loads(pickle.dumps(state)))
     np.testing.assert_array_equal(obs, state["obs"])
     assert_equal_plays(play(resumed, actions[30:]), uninterrupted)
+    assert resumed.np_random_seed == envs.np_random_seed
 
     envs.set_state(state)  # and the same environment, rewound
     assert_equal_plays(play(envs, actions[30:]), uninterrupted)
