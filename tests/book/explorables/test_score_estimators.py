@@ -93,6 +93,15 @@ def test_note_says_when_the_sign_is_wrong() -> None:
         assert ("wrong way" in state["note"]) == opposite
 
 
+def test_note_compares_no_variances_where_there_are_none() -> None:
+    """Every draw is clipped to −1, and paid nothing there."""
+    point = "{ mu: -2.4, log_sigma: Math.log(0.1), peak: 0, share: 0 }"
+    state = run_js(f'inbounds.models["score-estimators"]({point})')
+    assert set(state["table"]["std_loc"]) == {"0.000"}
+    assert "NaN" not in state["note"]
+    assert state["note"].endswith("No estimator varies in μ by as much as 0.0005.")
+
+
 def test_note_finds_no_sign_in_what_is_zero_but_for_rounding() -> None:
     point = "{ mu: 2.4, log_sigma: -1.7, peak: 1, share: 1 }"
     state = run_js(f'inbounds.models["score-estimators"]({point})')
