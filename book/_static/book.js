@@ -131,7 +131,7 @@
     const copy = range.cloneContents();
     const formulas = copy.querySelectorAll("[data-tex]");
     if (!formulas.length) return;
-    for (const input of copy.querySelectorAll("input")) input.remove(); /* a copied choice would take the tick from the reader's */
+    for (const input of copy.querySelectorAll("input")) input.removeAttribute("name"); /* a copied choice would take the reader's tick */
     for (const each of formulas) each.textContent = each.matches("div") ? `$$${each.dataset.tex}$$` : `$${each.dataset.tex}$`;
     const box = document.body.appendChild(document.createElement("div"));
     box.append(copy);

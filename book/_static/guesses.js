@@ -110,7 +110,7 @@
   };
 
   const check = (box) => {
-    const again = known(box); /* as this page shows it: another one may have checked the same box since */
+    const again = inputs(guesses(box)[0])[0].disabled; /* as this page shows it, whatever another one has stored since */
     read();
     if (again) {
       clear(box);

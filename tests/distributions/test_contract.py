@@ -1,6 +1,7 @@
 """What every law of the package promises, whatever its density."""
 
 import copy
+import math
 import pickle
 from typing import Any
 
@@ -360,6 +361,11 @@ def test_next_to_a_bound_at_zero_nothing_is_lost() -> None:
         distribution = LogitNormal(*double(0.0, 1.0), low, high)
         back = distribution.value_to_latent(distribution.latent_to_value(z))
         torch.testing.assert_close(back, z, rtol=1e-14, atol=0)
+
+
+def test_the_standard_deviation_of_what_is_no_law_is_nan(family: Family) -> None:
+    first, second = family.parameters()
+    assert family.law(first * math.nan, second * math.nan, -1.0, 1.0, validate_args=False).stddev.isnan()
 
 
 @pytest.mark.parametrize("law", [ClippedNormal, LogitNormal])

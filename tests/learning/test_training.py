@@ -215,6 +215,11 @@ def test_a_checkpoint_is_written_every_so_many_epochs_and_at_the_end(
     assert saved == [2, 4, 5]
 
 
+def test_a_number_in_a_checkpoint_keeps_its_shape(tmp_path: Path) -> None:
+    checkpoint.save(tmp_path / "one.pt", some_state(1) | {"of no dimension": np.array(3.0)})
+    assert checkpoint.load(tmp_path / "one.pt")["of no dimension"].shape == ()
+
+
 def some_state(epoch: int) -> dict[str, Any]:
     return {"config": {}, "networks": np.arange(3.0), "records": [epoch]}
 

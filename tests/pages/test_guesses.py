@@ -82,6 +82,8 @@ def test_a_box_that_another_page_has_checked_since_is_checked(context: BrowserCo
     for page in (first, second):
         page.goto(address + CHOICES[0])
     answered(first, right=True)
+    second.locator(".guess-check").first.click()
+    assert "No guess yet." in second.locator(".guess-result").all_inner_texts()
     answered(second, right=False)
     assert all(
         text.startswith(("Not so", "Off")) for text in second.locator(".guess-result").all_inner_texts()

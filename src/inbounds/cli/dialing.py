@@ -80,6 +80,7 @@ def dial(args: Sequence[str]) -> int:
         The exit code: 0; 1 where something failed; 2 where the command line is wrong.
 
     Raises:
+        CommandError: a check of nothing was asked for.
         SystemExit: help was asked for, or the command line is wrong; either has been written.
 
     Example:

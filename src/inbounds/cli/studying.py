@@ -145,6 +145,7 @@ def study(args: Sequence[str]) -> int:
         The exit code: 0; 1 where something failed; 2 where the command line is wrong; 128 + a signal that ended it.
 
     Raises:
+        CommandError: the dial was to check nothing.
         SystemExit: help was asked for, or the command line is wrong; either has been written.
 
     Example:
@@ -194,6 +195,8 @@ def study(args: Sequence[str]) -> int:
         return _complain(str(error), 2)
     except StudyError as error:
         return _complain(str(error), 1)
+    except PermissionError as error:
+        return _complain(f"{error}: change its permissions, or choose other folders (--results, --work)", 1)
     except OSError as error:
         if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
             raise
@@ -241,9 +244,10 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         raise StudyError(
             f"the report needs Matplotlib and Jinja2 ({error}): pip install '.[report]' in the source tree"
         ) from error
+    with console.status("reading the cells"):
+        outcomes = Outcomes.read(command.folder(), cells)
     try:
-        with console.status("reading the cells") as now:
-            outcomes = Outcomes.read(command.folder(), cells)
+        with console.status("writing") as now:
             path = write_report(outcomes, command.out, lambda section: now.update(f"writing: {section}"))
     except OSError as error:
         raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
@@ -276,6 +280,8 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
         mark = "ok" if finding.ok else "WRONG"
         console.print(f"{mark:5} {finding.subject}: {finding.message}", markup=False, soft_wrap=True)
 
+    if command.random < 0 or command.epochs < 1:
+        raise ValueError("--random takes 0 or more cells, and --epochs 1 or more")
     rerun = select(command.rerun, cells) if command.rerun else None
     if command.random:
         finished = [cell for cell in cells if command.folder().state(cell) == "finished"]

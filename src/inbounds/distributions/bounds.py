@@ -112,7 +112,7 @@ class BoundedDistribution(Distribution):
     def stddev(self) -> Tensor:
         """`[...]` standard deviation of the value; where the variance underflows to 0, so does its gradient."""
         variance = self.variance
-        spread = variance > 0
+        spread = ~(variance <= 0)  # what is NaN stays so
         return torch.where(spread, torch.where(spread, variance, 1.0).sqrt(), 0.0)
 
     def sample(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:

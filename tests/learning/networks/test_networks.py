@@ -1,5 +1,7 @@
+import copy
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inbounds.learning import ActorCritic, Mlp, NetworkConfig, Policy, PolicyConfig
+from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.networks.perceptron import initialize_orthogonal, initialize_pytorch, tanh
 
 SIZES = (5, 16, 16, 4)
@@ -163,3 +166,17 @@ def test_named_tensors_rebuild_the_network() -> None:
 def test_network_config_is_checked(wrong: dict) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         NetworkConfig(**wrong)
+
+
+def test_a_copied_optimiser_trains_the_copied_network() -> None:
+    net = Mlp(2, (3, 4, 1))
+    torch.nn.init.normal_(net.theta)
+    optimiser = SeedAdam([net], 0.1, eps=1e-8, max_grad_norm=None)
+    before = net.theta.clone()
+    twin, other = copy.deepcopy((net, optimiser))
+    obs = torch.ones(2, 5, 3)
+    other.minimize(twin(obs).square().sum())
+    assert torch.equal(net.theta, before)
+    assert not torch.equal(twin.theta, before)
+    assert np.allclose(twin.act(obs[:, 0].numpy()), twin(obs)[:, 0].detach().numpy(), rtol=1e-5)
+    assert torch.equal(pickle.loads(pickle.dumps(twin.seed(1))).theta, twin.theta[1:])

@@ -102,14 +102,19 @@ def test_no_states_have_no_actions(tmp_path: Path) -> None:
     assert policy.distribution(none).batch_shape == (0, 2)
 
 
-def test_a_diverged_policy_stays_in_the_middle_though_some_weights_are_finite(tmp_path: Path) -> None:
-    trainer = saved_run(tmp_path, family="gaussian")
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_diverged_policy_stays_in_the_middle_though_some_weights_are_finite(
+    family: str, tmp_path: Path
+) -> None:
+    trainer = saved_run(tmp_path, family=family)
     tensors = trainer.tensors()
     tensors["policy.2.bias"][0, 0] = np.nan  # of the first motor alone
     tensors["diverged"][0] = True
     policy = TrainedPolicy.from_tensors(trainer.config, tensors, 0)
     for way in policy.greedy_choices:
         assert policy.act(rng().normal(size=3), way).tolist() == [0.0, 0.0]
+    with pytest.raises(ValueError, match="the policy has diverged"):
+        policy.distribution(rng().normal(size=3))
 
 
 def test_a_file_that_may_not_be_read_is_not_called_damaged(

@@ -17,7 +17,7 @@ from rich.console import Console
 
 from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
-from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study
+from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study, store
 from inbounds.study.running import many_cells
 from inbounds.study.running.attempts import RETRIES, CellReport
 from inbounds.study.running.cell_lock import CellLock, read_claim
@@ -362,6 +362,24 @@ def test_only_what_has_just_been_finished_is_committed(
     assert ("git said no" in said.getvalue()) == commit
 
 
+def test_a_cell_that_may_not_be_read_is_no_damaged_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(*args: Any, **more: Any) -> None:
+        raise PermissionError(13, "Permission denied", "a.parquet")
+
+    for name in ("read_table", "read_schema"):
+        monkeypatch.setattr(store.pq, name, refuse)
+    for read in (store.read_cell, store.read_metadata):
+        with pytest.raises(PermissionError):
+            read("a.parquet")
+    (tmp_path / "cells").mkdir()
+    (tmp_path / "cells" / "standard-hopper-ppo-beta.parquet").write_bytes(b"")
+    assert study(["report", "--results", str(tmp_path), "--out", str(tmp_path / "report.html")]) == 1
+    said = capsys.readouterr().err
+    assert "Permission denied: 'a.parquet': change its permissions" in said
+
+
 def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, cells = folder_in(tmp_path), cells_of(1)
     run_cell(cells[0], folder)
@@ -402,6 +420,9 @@ def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFi
     assert "no cell matches no-such-cell: use an arm" in capsys.readouterr().err
     assert study(["verify", "--results", str(tmp_path)]) == 1
     assert "0 of 0 files" in capsys.readouterr().out
+    for wrong in ("--random=-1", "--epochs 0"):
+        assert study(["verify", *wrong.split()]) == 2
+        assert "--random takes 0 or more cells" in capsys.readouterr().err
     for wrong in ("--jobs 0", "--nice 20"):
         assert study(["run", "standard", *wrong.split()]) == 2
         assert f"{wrong.split()[0][2:]} must be" in capsys.readouterr().err

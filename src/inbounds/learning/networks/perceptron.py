@@ -11,6 +11,7 @@ the layers are views: an optimiser steps on one tensor, and a seed's gradient is
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections.abc import Sequence
@@ -124,9 +125,22 @@ class Mlp:
         self.layers = [SeedLinear(*pair) for pair in zip(weights, biases, strict=True)]
         self._arrays = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return perceptrons with weights and gradients of their own, which a copied optimiser finds."""
+        one = memo[id(self)] = object.__new__(type(self))
+        one.__dict__.update(
+            {
+                name: copy.deepcopy(value, memo)
+                for name, value in vars(self).items()
+                if name not in ("layers", "_arrays")
+            }
+        )
+        one._find_layers()
+        return one
+
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let a copy or a pickle have weights of its own, and no gradients."""
-        return _with_weights, (type(self), self.sizes, self.theta)
+        """Let a pickle have the weights, and no gradients."""
+        return _with_weights, (type(self), self.sizes, self.theta.clone())
 
     def seed(self, index: int) -> Self:
         """Return the perceptron of one seed, S = 1, which has its weights in common with these."""

@@ -117,18 +117,18 @@ class TrainedPolicy:
                 does not offer.
         """
         outputs, shape = self._outputs(obs)
-        if greedy == "sample" and not len(outputs):
-            return np.empty(shape, self._policy.dtype)
-        if greedy == "sample":
-            rng = np.random.default_rng() if rng is None else rng
-            action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
-        elif greedy in self.greedy_choices:
-            action = self._policy.greedy(torch.from_numpy(outputs), greedy)
-        else:
+        if greedy not in self.greedy_choices:
             raise ValueError(
                 f"{self.config.policy.family} does not act by {greedy!r}: "
                 f"choose one of {', '.join(self.greedy_choices)}"
             )
+        if self.diverged or not len(outputs):  # a part of a diverged policy's weights may be finite
+            return np.broadcast_to(self._policy.centre.astype(self._policy.dtype), shape).copy()
+        if greedy == "sample":
+            rng = np.random.default_rng() if rng is None else rng
+            action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
+        else:
+            action = self._policy.greedy(torch.from_numpy(outputs), greedy)
         return action.reshape(shape)
 
     def distribution(self, obs: NDArray[Any]) -> Distribution:
@@ -143,7 +143,7 @@ class TrainedPolicy:
             For `gaussian` the Normal that is drawn from, before any clip.
 
         Raises:
-            ValueError: observations of another size or not finite.
+            ValueError: observations of another size or not finite, or a policy that has diverged.
 
         Example:
             >>> from inbounds.learning import Trainer, preset
@@ -152,6 +152,10 @@ class TrainedPolicy:
             >>> type(law).__name__, tuple(law.scale.shape), tuple(law.log_prob(law.sample()).sum(-1).shape)
             ('LogitNormal', (5, 3), (5,))
         """
+        if self.diverged:
+            raise ValueError(
+                "the policy has diverged: it has no distribution, and holds the middle of its box"
+            )
         outputs, shape = self._outputs(obs)
         return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], outputs.shape[-1]))
 
@@ -171,10 +175,6 @@ class TrainedPolicy:
         batch = np.atleast_2d(obs)  # [B, O]
         seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
         outputs = self._network.act(seen)  # the weights of one seed serve every row
-        if self.diverged:
-            outputs = np.full_like(
-                outputs, np.nan
-            )  # weights that are still finite would move some of the motors
         return outputs, (*obs.shape[:-1], len(self.low))
 
 

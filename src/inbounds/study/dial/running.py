@@ -65,9 +65,11 @@ class DialFolder:
             return False
         try:
             stored = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
-        except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
+            return is_of(cell, stored["config"])
+        except PermissionError:  # the file may be sound
+            raise
+        except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
             raise damaged(path, error, "delete it, and run the command again") from error
-        return is_of(cell, stored["config"])
 
     def read(self) -> pa.Table:
         """Read the map, after comparing it with its checksum.

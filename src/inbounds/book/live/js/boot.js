@@ -55,6 +55,7 @@ inbounds.live ??= {};
   async function ask(element, button, says) {
     if (element.dataset.state === "loading") return;
     element.dataset.state = "loading";
+    button.setAttribute("aria-disabled", "true");
     says.textContent = "Loading MuJoCo and the policies …";
     try {
       const mujoco = await live.start();
@@ -66,6 +67,7 @@ inbounds.live ??= {};
       element.dataset.state = "live";
     } catch (error) {
       element.dataset.state = "film";
+      button.removeAttribute("aria-disabled");
       says.textContent = `The robots could not be started here (${error.message}); the film stays.`;
     }
   }

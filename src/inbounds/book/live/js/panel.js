@@ -111,6 +111,7 @@ inbounds.live.Panel = class {
     this.scene?.dispose();
     this.player?.world.delete();
     this.player = this.scene = this.densities = null;
+    this.body.hidden = true;
   }
 
   draw(colors, view) {

@@ -37,7 +37,7 @@ inbounds.live.Player = class {
   // Let the noise be so many times as large from the next action on; the law that it will have is there at once.
   widen(spread) {
     this.spread = spread;
-    this.parameters = this.policy.parameters(this.seen, spread);
+    if (this.seen) this.parameters = this.policy.parameters(this.seen, spread);
   }
 
   // One step of the physics; true when a step of the environment is complete.

@@ -119,6 +119,7 @@ inbounds.live.Show = class {
       } finally {
         this.busy = false;
       }
+      this.says.textContent = ""; // of what was there before
       this.restart(this.start);
       this.wake();
     });
