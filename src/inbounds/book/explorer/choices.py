@@ -147,7 +147,7 @@ def verdict(row: Row, *, brief: bool = False) -> str:
     if isinstance(row, Evidence):
         if grade(row) == "no difference found":
             return f"{grade(row)}, the interval ends at 0" if apart else said
-        return f"{said}, {grade(row)}" if apart else grade(row)
+        return f"{said}, {grade(row)}" if apart and not answers.too_small(row) else grade(row)
     if not apart:
         return said
     if not row.found:
