@@ -201,7 +201,7 @@ def _check_environment(config: TrainConfig) -> None:
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
     try:
         if module_of(config.env) is not None:
-            if [bool(part) for part in config.env.split(":")] != [True, True]:
+            if len(parts := config.env.split(":")) != 2 or not all(parts):
                 raise CommandError(f"{config.env!r} is no environment: give an id, or module:id. {tasks}", 2)
             find_modules_here()
         envs = make_environments(config, 1)

@@ -257,7 +257,7 @@ def read_cell(path: str | Path) -> pa.Table:
     """
     try:
         return pq.read_table(path, page_checksum_verification=True)
-    except (FileNotFoundError, PermissionError):  # the file may be sound
+    except (FileNotFoundError, PermissionError):  # what is there may be sound
         raise
     except (pa.ArrowException, OSError) as error:
         raise damaged(Path(path), error, restore(path)) from error
@@ -272,7 +272,7 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     """
     try:
         found = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
-    except (FileNotFoundError, PermissionError):  # the file may be sound
+    except (FileNotFoundError, PermissionError):  # what is there may be sound
         raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
         raise damaged(Path(path), error, restore(path)) from error

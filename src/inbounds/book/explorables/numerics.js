@@ -18,7 +18,7 @@ inbounds.numerics = (() => {
 
   // A number as the page writes it: so many decimals, a true minus, and none before zero.
   const number = (v, digits) =>
-    Number.isFinite(v) ? v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−") : String(v).replace("Infinity", "∞").replace("-", "−");
+    v.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("Infinity", "∞").replace("-", "−");
 
   // Series of Marsaglia (2004), Evaluating the Normal Distribution, Journal of Statistical Software 11(4).
   function normalCdf(x) {

@@ -150,8 +150,13 @@ inbounds.live.Show = class {
     this.wake();
   }
 
+  // Whether there is a robot to move: not while one is being loaded, and not after none could be.
+  get ready() {
+    return !this.busy && this.players.length > 0;
+  }
+
   get runs() {
-    return this.playing && this.visible && !document.hidden && !this.busy && this.players.length > 0;
+    return this.playing && this.visible && !document.hidden && this.ready;
   }
 
   wake() {
@@ -165,7 +170,7 @@ inbounds.live.Show = class {
     const seconds = Math.min(Math.max(now - this.last, 0), 100) / 1000;
     this.last = now;
     if (this.runs) this.run(seconds * this.rate);
-    if (!this.busy) this.draw();
+    this.draw();
     if (this.runs) this.frame = requestAnimationFrame((next) => this.tick(next));
   }
 
@@ -200,7 +205,7 @@ inbounds.live.Show = class {
   // One step of the environment, while paused.
   step() {
     if (this.playing) this.setPlaying(false);
-    if (this.busy || !this.players.length) return;
+    if (!this.ready) return;
     const { frame_skip: count } = this.players[0].world.task;
     for (let i = 0; i < count; i++) this.advance();
     this.redraw();
@@ -223,7 +228,7 @@ inbounds.live.Show = class {
 
   speak() {
     this.silence = 0;
-    if (this.busy || !this.players.length) return;
+    if (!this.ready) return;
     this.says.textContent = this.panels.filter((panel) => panel.player).map((panel) => panel.sentence()).join(" ");
   }
 
@@ -231,11 +236,12 @@ inbounds.live.Show = class {
     if (this.frame || this.busy) return;
     this.drawing ??= requestAnimationFrame(() => {
       this.drawing = null;
-      if (!this.busy) this.draw();
+      this.draw();
     });
   }
 
   draw() {
+    if (this.busy) return;
     this.colors ??= this.readColors();
     const view = inbounds.live.VIEWS[this.camera.select.value];
     for (const panel of this.panels) panel.draw(this.colors, view);
