@@ -20,14 +20,14 @@ from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig
-from inbounds.learning.storage.run_metadata import METADATA_KEY, metadata_of
+from inbounds.learning.storage.parquet import read_about, read_table
+from inbounds.learning.storage.run_metadata import metadata_of
 from inbounds.learning.storage.run_store import COLUMNS as OF_A_RUN
 from inbounds.learning.storage.stored_config import changed_fields
-from inbounds.learning.storage.whole_files import DamagedFileError, damaged, file_lock, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, file_lock, write_whole
 from inbounds.study.cell import Cell, digest_of
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
@@ -255,12 +255,7 @@ def read_cell(path: str | Path) -> pa.Table:
         >>> read_cell("results/cells/standard-hopper-ppo-beta.parquet").num_rows  # 500 epochs of ten seeds
         5000
     """
-    try:
-        return pq.read_table(path, page_checksum_verification=True)
-    except (FileNotFoundError, PermissionError):  # what is there may be sound
-        raise
-    except (pa.ArrowException, OSError) as error:
-        raise damaged(Path(path), error, restore(path)) from error
+    return read_table(path, restore(path))
 
 
 def read_metadata(path: str | Path) -> dict[str, Any]:
@@ -270,20 +265,17 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
         FileNotFoundError: there is no such file.
         DamagedFileError: it is damaged.
     """
-    try:
-        found = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
-    except (FileNotFoundError, PermissionError):  # what is there may be sound
-        raise
-    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-        raise damaged(Path(path), error, restore(path)) from error
-    if not {"config", "study_version", "id"} <= found.keys():
-        raise damaged(Path(path), "it is no cell of a study", restore(path))
-    return found
+    return read_about(path, restore(path), {"config", "study_version", "id"})
 
 
-def restore(path: str | Path) -> str:
-    """Return what to do about a damaged result."""
-    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and run the cell again"
+def restore(path: str | Path, again: str = "run the cell again") -> str:
+    """Return what to do about a damaged result.
+
+    Args:
+        path: of the file.
+        again: how it is made anew.
+    """
+    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and {again}"
 
 
 # ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch

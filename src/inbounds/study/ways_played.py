@@ -19,9 +19,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from inbounds.learning import FAMILIES
-from inbounds.study import store
+from inbounds.learning.storage.parquet import read_table
+from inbounds.learning.storage.whole_files import damaged
 from inbounds.study.grid import ROBOTS, Cell
-from inbounds.study.store import StudyFolder
+from inbounds.study.store import StudyFolder, restore
 
 Floats = NDArray[np.float64]
 
@@ -122,9 +123,10 @@ def read_ways(folder: StudyFolder, cell: Cell) -> dict[str, Played]:
         True
     """
     path = evaluation_file(folder, cell)
-    table = store.read_cell(path)
+    remedy = restore(path, f"play the policies again (inbounds study evaluate {cell.id})")
+    table = read_table(path, remedy)
     if said := wrong_ways(cell, table):
-        raise store.damaged(path, said)
+        raise damaged(path, said, remedy)
     names, shape = table["way"].to_pylist(), (len(cell.kept_seeds), EPISODES[cell.robot])
     found = {}
     for way in ways_of(cell.family):
@@ -148,7 +150,8 @@ def read_nothing(folder: StudyFolder) -> dict[str, Floats]:
         >>> nothing["Ant"].shape, bool((nothing["Ant"] > 800).all())  # a point a step for not lying on its back
         ((10, 3), True)
     """
-    table = store.read_cell(nothing_file(folder))
+    path = nothing_file(folder)
+    table = read_table(path, restore(path, "play it again (inbounds study evaluate)"))
     robots = np.array(table["robot"].to_pylist())
     returns = table["return"].to_numpy()
     return {
@@ -163,7 +166,7 @@ def wrong_ways(cell: Cell, table: pa.Table) -> str:
     Example:
         >>> from inbounds.study import select
         >>> cell, = select(["standard-hopper-ppo-beta"])
-        >>> rows = store.read_cell(evaluation_file(StudyFolder(), cell))  # in the project's folder
+        >>> rows = read_table(evaluation_file(StudyFolder(), cell))  # in the project's folder
         >>> wrong_ways(cell, rows), wrong_ways(cell, rows.drop_columns(["return"]))
         ('', 'column return is missing')
     """

@@ -1,13 +1,18 @@
-"""How tables are stored, those of a run and those of the study's cells."""
+"""How tables are stored and read, those of a run and those of the studies' cells."""
 
 from __future__ import annotations
 
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from inbounds.learning.storage.run_metadata import METADATA_KEY
+from inbounds.learning.storage.whole_files import damaged
 
 
 def parquet_bytes(table: pa.Table, metadata: str) -> Any:
@@ -28,3 +33,65 @@ def parquet_bytes(table: pa.Table, metadata: str) -> Any:
         write_page_checksum=True,
     )
     return sink.getvalue()
+
+
+def read_table(path: str | Path, remedy: str = "") -> pa.Table:
+    """Read a table that `parquet_bytes` has stored, each page against its checksum.
+
+    Args:
+        path: of the file.
+        remedy: what to do about a damaged file; by default what `damaged` says.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        DamagedFileError: it is damaged.
+    """
+    with _damage_named(path, remedy):
+        return pq.read_table(path, page_checksum_verification=True)
+
+
+def read_about(
+    path: str | Path, remedy: str = "", keys: frozenset[str] | set[str] = frozenset()
+) -> dict[str, Any]:
+    """Read what a stored table says of itself, without its rows.
+
+    Args:
+        path: of the file.
+        remedy: what to do about a damaged file; by default what `damaged` says.
+        keys: entries without which the file is none of ours.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        DamagedFileError: it is damaged, or says nothing of itself, or lacks a key.
+    """
+    with _damage_named(path, remedy):
+        found = about_of(pq.read_schema(path))
+        if missing := sorted(keys - found.keys()):
+            raise ValueError(f"it does not say its {missing[0]}")
+        return found
+
+
+def about_of(schema: pa.Schema) -> dict[str, Any]:
+    """Return what a stored table says of itself, from its schema.
+
+    Raises:
+        ValueError: it says nothing; other software wrote it.
+
+    Example:
+        >>> about_of(pa.schema([], {METADATA_KEY: '{"id": "ours"}'}))
+        {'id': 'ours'}
+    """
+    found = json.loads((schema.metadata or {}).get(METADATA_KEY.encode(), "null"))
+    if not isinstance(found, dict):
+        raise ValueError("the table does not say where it comes from: inbounds did not write it")
+    return found
+
+
+@contextlib.contextmanager
+def _damage_named(path: str | Path, remedy: str) -> Iterator[None]:
+    try:
+        yield
+    except (FileNotFoundError, PermissionError):  # what is there may be sound
+        raise
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise damaged(Path(path), error, remedy) from error

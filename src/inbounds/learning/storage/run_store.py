@@ -17,14 +17,13 @@ from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.parquet import parquet_bytes
+from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_table
 from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import damaged, find, write_whole
@@ -130,18 +129,17 @@ def read_curves(run: str | Path) -> pa.Table:
         DamagedFileError: the file is damaged.
         ValueError: another version of the package wrote it, with options that this one does not know.
     """
-    path = find(run, CURVES_FILE)
-    try:
-        return pq.read_table(path, page_checksum_verification=True)
-    except PermissionError:  # the file may be sound
-        raise
-    except (pa.ArrowException, OSError) as error:
-        raise damaged(path, error) from error
+    return read_table(find(run, CURVES_FILE))
 
 
 def config_of(curves: pa.Table) -> TrainConfig:
-    """Return the configuration of the run that curves from `read_curves` belong to."""
-    return config_from(json.loads(curves.schema.metadata[METADATA_KEY.encode()]))
+    """Return the configuration of the run that curves from `read_curves` belong to.
+
+    Raises:
+        ValueError: they are of no run, or another version of the package wrote them, with options that this one does
+            not know.
+    """
+    return config_from(about_of(curves.schema))
 
 
 # ---- policies

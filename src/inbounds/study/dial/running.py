@@ -20,16 +20,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from inbounds.learning import Trainer, train
-from inbounds.learning.storage.parquet import parquet_bytes
-from inbounds.learning.storage.run_metadata import METADATA_KEY
+from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_about, read_table
 from inbounds.learning.storage.stored_config import changed_fields, describe
-from inbounds.learning.storage.whole_files import DamagedFileError, damaged, held, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, held, write_whole
 from inbounds.study.dial.cells import DialCell, dial_cells
 from inbounds.study.dial.task import DialEnv
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import ROOT
 
 MEASURED = ("score", "saturation", "action_std", "kl")
+RAN_ON = ("commit", "engine", "versions", "processor")
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,12 @@ class DialFolder:
         path = self.cell_file(cell)
         if not path.is_file():
             return False
-        try:
-            stored = json.loads(pq.read_schema(path).metadata[METADATA_KEY.encode()])
-            return is_of(cell, stored["config"])
-        except PermissionError:  # the file may be sound
-            raise
-        except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
-            raise damaged(path, error, "delete it, and run the command again") from error
+        return is_of(cell, self.about(cell)["config"])
+
+    def about(self, cell: DialCell) -> dict[str, Any]:
+        """Return what a finished cell's file says of itself."""
+        keys = {"config", "seconds", *RAN_ON}
+        return read_about(self.cell_file(cell), "delete it, and run the command again", keys)
 
     def read(self) -> pa.Table:
         """Read the map, after comparing it with its checksum.
@@ -172,21 +171,16 @@ def pack(folder: DialFolder) -> bool:
     cells = dial_cells()
     if not all(folder.finished(cell) for cell in cells):
         return False
-    tables = [pq.read_table(folder.cell_file(cell)).replace_schema_metadata(None) for cell in cells]
-    said = [
-        json.loads(pq.read_schema(folder.cell_file(cell)).metadata[METADATA_KEY.encode()]) for cell in cells
-    ]
-    about = {
+    tables = [read_table(folder.cell_file(cell)).replace_schema_metadata(None) for cell in cells]
+    said = [folder.about(cell) for cell in cells]
+    of_the_map = {
         "configs": {cell.id: each["config"] for cell, each in zip(cells, said, strict=True)},
         "seconds": {cell.id: each["seconds"] for cell, each in zip(cells, said, strict=True)},
         "ran_on": [
-            json.loads(text)
-            for text in sorted(
-                {json.dumps({k: e[k] for k in ("commit", "engine", "versions", "processor")}) for e in said}
-            )
+            json.loads(text) for text in sorted({json.dumps({k: each[k] for k in RAN_ON}) for each in said})
         ],
     }
-    data = parquet_bytes(pa.concat_tables(tables), json.dumps(about))
+    data = parquet_bytes(pa.concat_tables(tables), json.dumps(of_the_map))
     folder.results.mkdir(parents=True, exist_ok=True)
     digest = hashlib.sha256(data).hexdigest()
     write_whole(folder.results / "checksums.txt", f"{digest}  {folder.map_file.name}\n".encode())
@@ -203,7 +197,7 @@ def wrong_cells(folder: DialFolder, *, cells: Sequence[DialCell], epochs: int = 
         epochs: how many.
     """
     stored = folder.read()
-    configs = json.loads(stored.schema.metadata[METADATA_KEY.encode()])["configs"]
+    configs = about_of(stored.schema)["configs"]
     wrong = []
     for cell in cells:
         rows = np.array(stored["cell"].to_numpy() == cell.id)

@@ -1,0 +1,64 @@
+"""Stored tables: what they say of themselves, and how a damaged one is told from a sound one."""
+
+import json
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_about, read_table
+from inbounds.learning.storage.run_store import config_of
+from inbounds.learning.storage.whole_files import DamagedFileError
+
+TABLE = pa.table({"x": pa.array([float(i) for i in range(4000)], pa.float32())})
+ABOUT = {"id": "ours", "config": {}}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "table.parquet"
+    path.write_bytes(parquet_bytes(TABLE, json.dumps(ABOUT)))
+    return path
+
+
+def test_a_table_comes_back_with_what_it_says_of_itself(path: Path) -> None:
+    table = read_table(path)
+    assert table.equals(TABLE)
+    assert read_about(path, keys={"id", "config"}) == about_of(table.schema) == ABOUT
+
+
+def test_a_flipped_bit_a_lost_end_and_a_foreign_table_are_told_with_the_remedy(path: Path) -> None:
+    whole = path.read_bytes()
+    flipped = bytearray(whole)
+    flipped[200] ^= 1
+    path.write_bytes(flipped)
+    with pytest.raises(DamagedFileError, match="make it again"):
+        read_table(path, "make it again")
+    path.write_bytes(whole[:-9])
+    for read in (read_table, read_about):
+        with pytest.raises(DamagedFileError, match="make it again"):
+            read(path, "make it again")
+    pq.write_table(TABLE, path)
+    with pytest.raises(DamagedFileError, match=r"inbounds did not write it.*make it again"):
+        read_about(path, "make it again")
+    with pytest.raises(ValueError, match="inbounds did not write it"):
+        config_of(read_table(path))
+
+
+@pytest.mark.parametrize("said", ["no JSON", "[1]", "null"])
+def test_words_that_are_no_entries_are_damage(said: str, path: Path) -> None:
+    path.write_bytes(parquet_bytes(TABLE, said))
+    with pytest.raises(DamagedFileError):
+        read_about(path)
+
+
+def test_a_missing_entry_is_named(path: Path) -> None:
+    with pytest.raises(DamagedFileError, match="it does not say its seconds"):
+        read_about(path, keys={"id", "seconds"})
+
+
+def test_a_file_that_is_not_there_is_no_damage(tmp_path: Path) -> None:
+    for read in (read_table, read_about):
+        with pytest.raises(FileNotFoundError):
+            read(tmp_path / "none.parquet")
