@@ -7,6 +7,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
+from inbounds import robots
 from inbounds.learning.storage.run_store import load_policy
 from tests.cli.small import run, small, succeeds
 
@@ -104,6 +105,17 @@ def test_a_full_disk_leaves_no_film(runs: Path, tmp_path: Path, monkeypatch: pyt
     assert code == 1
     assert "Free some space on the disk" in err
     assert not list(tmp_path.iterdir())
+
+
+def test_without_an_encoder_no_film_is_begun(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing() -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", nothing)
+    monkeypatch.setattr(robots, "record", lambda *args, **kwargs: pytest.fail("a film was made"))
+    code, _, err = run("watch", runs / "hopper", "--seconds", "0.1")
+    assert code == 1
+    assert "pip install --force-reinstall imageio-ffmpeg" in err
 
 
 def test_paths_with_spaces_are_quoted_in_advice(tmp_path: Path) -> None:

@@ -54,3 +54,15 @@ def weights(trainer: Trainer) -> torch.Tensor:
 
 def rng(seed: int = 0) -> np.random.Generator:
     return np.random.default_rng(seed)
+
+
+def same_records(a: list[dict], b: list[dict], rows: slice | list[int] = slice(None)) -> bool:
+    """Whether two runs' records agree bitwise (NaN equals NaN), wall time apart."""
+    timeless = [key for key in a[0] if key != "seconds"]
+    return all(
+        np.array_equal(np.atleast_1d(x[key])[rows], np.atleast_1d(y[key])[rows], equal_nan=True)
+        if np.ndim(x[key])
+        else x[key] == y[key]
+        for x, y in zip(a, b, strict=True)
+        for key in timeless
+    )

@@ -22,7 +22,7 @@ from inbounds.learning.updates.engine import compiled_engine
 from inbounds.learning.updates.value import fit_values
 from tests.learning.made_up import SHAPES, made_up_networks, made_up_rollout
 from tests.learning.point import PointEnv
-from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
+from tests.learning.small import ALGORITHMS, FAMILIES, same_records, small_config, small_run, weights
 
 STEPS = 64
 TOLERANCE = {"float32": 3e-6, "float64": 2e-11}
@@ -178,6 +178,15 @@ def test_a_resumed_run_is_the_run_that_was_never_interrupted(algo: str, tmp_path
     while not resumed.finished:
         resumed.epoch()
     assert torch.equal(weights(whole), weights(resumed))
+
+
+def test_a_state_is_a_snapshot() -> None:
+    run = small_run(compiled(small_config("ppo", "logit-normal", epochs=1)))
+    state = run.state_dict()
+    first = run.epoch()
+    for _ in range(2):  # later epochs leave the state as it is
+        run.load_state_dict(state)
+        assert same_records([run.epoch()], [first])
 
 
 def test_the_engine_cannot_be_changed_in_mid_run(tmp_path: Path) -> None:

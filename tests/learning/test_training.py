@@ -19,20 +19,7 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.whole_files import DamagedFileError, held
 from inbounds.learning.training import prepare
 from tests.learning.point import PointEnv
-from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
-
-
-def same_records(a: list[dict], b: list[dict], rows: slice | list[int] = slice(None)) -> bool:
-    """Whether two runs' records agree bitwise (NaN equals NaN), wall time apart."""
-    timeless = [key for key in a[0] if key != "seconds"]
-    return all(
-        np.array_equal(np.atleast_1d(x[key])[rows], np.atleast_1d(y[key])[rows], equal_nan=True)
-        if np.ndim(x[key])
-        else x[key] == y[key]
-        for x, y in zip(a, b, strict=True)
-        for key in timeless
-    )
-
+from tests.learning.small import ALGORITHMS, FAMILIES, same_records, small_config, small_run, weights
 
 # ---- a seed's run is its own
 
@@ -166,6 +153,13 @@ def test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics() -> N
     assert np.array_equal(collector.obs, collector.normalizer(first))
     # Fresh statistics would have seen nothing but these observations: all would be 0.
     assert np.abs(collector.obs).max() > 0.1
+
+
+def test_new_episodes_after_a_resumption_begin_with_no_return() -> None:
+    run = small_run(small_config(epochs=2), saves=False)
+    assert run.collector.returns.all()  # episodes are under way
+    run.load_state_dict(run.state_dict())
+    assert not run.collector.returns.any()
 
 
 KILLED = """

@@ -151,6 +151,19 @@ def test_a_step_that_is_good_is_taken_whole() -> None:
     assert ((after > before) & (nets.policy.law.kl(old, new).mean(1) <= config.max_kl)).all()
 
 
+def test_the_record_tells_which_seeds_step_was_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = trpo.natural_step
+
+    def downhill_for_the_first(*args) -> torch.Tensor:
+        return sound(*args) * torch.tensor([[-1.0], [1.0], [1.0]])
+
+    monkeypatch.setattr(trpo, "natural_step", downhill_for_the_first)
+    record = small_run(small_config("trpo", epochs=1)).records[0]
+    assert record["accepted"].tolist() == [0, 1, 1]
+    assert record["step_fraction"][0] == 0
+    assert (record["step_fraction"][1:] > 0).all()
+
+
 def test_each_seeds_search_has_its_own_end() -> None:
     """One seed gets a step that is far too long, one a NaN, one a step downhill, one its own."""
     trainer, nets, rollout = started(seeds=4, horizon=128)

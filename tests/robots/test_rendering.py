@@ -142,6 +142,23 @@ def test_a_film_runs_in_real_time(name, stride, fps):
         np.testing.assert_array_equal(renderer.frame(), film.frames[-1])
 
 
+def test_steps_faster_than_the_frame_rate_are_left_out():
+    still = np.zeros(6, np.float32)
+    every = record(made("HalfCheetah"), lambda obs: still, seconds=0.4, width=64, height=48)
+    second = record(made("HalfCheetah"), lambda obs: still, seconds=0.4, width=64, height=48, max_fps=10)
+    assert (every.fps, second.fps) == (20, 10)
+    np.testing.assert_array_equal(second.frames, every.frames[::2])
+
+
+def test_a_film_of_one_robot_of_many_is_that_of_the_robot_alone():
+    envs = gymnasium.vector.SyncVectorEnv([lambda: gymnasium.make("HalfCheetah-v5")] * 2)
+    actions = np.stack([np.full(6, 0.5), np.full(6, -0.5)]).astype(np.float32)
+    second = record(envs, lambda obs: actions, seconds=0.4, seed=3, index=1, width=64, height=48)
+    alone = record(made("HalfCheetah"), lambda obs: actions[1], seconds=0.4, seed=4, width=64, height=48)
+    np.testing.assert_array_equal(second.frames, alone.frames)
+    assert second.total_reward == alone.total_reward
+
+
 def test_the_reward_of_a_film_is_that_of_its_steps():
     env = made("HalfCheetah")
     action = np.full(6, 0.5, np.float32)
