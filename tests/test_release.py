@@ -46,6 +46,22 @@ def test_the_address_of_the_repository_is_the_configurations() -> None:
     assert CITATION.get("repository-code", url) == url
 
 
+def test_the_packages_readme_links_to_the_repositorys_files() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf8")
+    relative = re.findall(r"\]\((?!https:)([^)]+)\)", readme)
+    assert relative
+    assert [path for path in relative if not (ROOT / path).is_file()] == []
+    for rule in PYPROJECT["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]["substitutions"]:
+        readme = re.sub(rule["pattern"], rule["replacement"], readme)
+    assert re.findall(r"\]\((?!https:)([^)]+)\)", readme) == []
+    ours = f"{REPOSITORY['url']}/(blob|raw)/{REPOSITORY['branch']}/"
+    linked = re.findall(rf"\]\({ours}([^)]+)\)", readme)
+    assert [path for _, path in linked] == relative
+    assert {path for kind, path in linked if kind == "raw"} == {
+        path for path in relative if path.endswith(".svg")
+    }
+
+
 def test_the_page_that_tells_to_clone_has_the_configurations_address() -> None:
     url, remark = REPOSITORY["url"], citing.cloning(REPOSITORY["url"])[-1]
     preface = (ROOT / "book" / "preface.md").read_text(encoding="utf8")

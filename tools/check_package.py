@@ -79,6 +79,14 @@ def check(python: Path, folder: Path, extra: str) -> None:
     for command in COMMANDS:
         run(str(python), "-W", "error", "-m", "inbounds", *command.split(), "--help", folder=folder)
     run(str(python), "-W", "error", "-c", snippet(), folder=folder)
+    shown = run(
+        str(python),
+        "-c",
+        "import importlib.metadata as m; print(m.metadata('inbounds')['Description'])",
+        folder=folder,
+    )
+    assert "](" in shown
+    assert re.findall(r"\]\((?!https:)[^)]*\)", shown) == [], "the README's links lead nowhere on PyPI"
     for name, module in EXTRAS.items():
         found = f"import importlib.util as u; print(u.find_spec({module!r}) is not None)"
         here = run(str(python), "-c", found, folder=folder).strip() == "True"
