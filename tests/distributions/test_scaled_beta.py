@@ -185,6 +185,12 @@ def test_from_mode(bounds: tuple[float, float], fraction: float, concentration: 
     assert narrower.stddev < ours.stddev
 
 
+def test_without_parameters_there_is_no_mode() -> None:
+    nan, two = torch.tensor(torch.nan), torch.tensor(2.0)
+    for alpha, beta in ((nan, two), (two, nan), (nan, nan)):
+        assert ScaledBeta(alpha, beta, validate_args=False).mode.isnan()
+
+
 def test_from_mode_refuses_what_is_no_mode() -> None:
     with pytest.raises(ValueError, match="the mode must lie within"):
         ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0)

@@ -215,6 +215,7 @@ class ScaledBeta(SigmoidMapped):
         inside = (alpha - 1) / torch.where(peaked, excess, torch.ones_like(alpha))
         at_bound = ((beta < 1) & (beta <= alpha)).to(alpha.dtype)
         fraction = torch.where(peaked, inside, torch.where(no_pole, torch.full_like(alpha, 0.5), at_bound))
+        fraction = torch.where(excess.isnan(), excess, fraction)  # NaN is no order, and would be a bound
         return torch.where(
             fraction < 0.5, self.low + self.width * fraction, self.high - self.width * (1 - fraction)
         )

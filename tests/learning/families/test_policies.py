@@ -109,6 +109,8 @@ def test_what_is_executed_is_in_the_box_in_its_precision_and_a_diverged_policy_h
     outputs = np.full((2, 4), np.nan)
     streams = [np.random.default_rng(s) for s in (0, 1)]
     assert bound.sample(outputs, streams).tolist() == [[-0.5, 2.5]] * 2
+    with pytest.raises(ValueError, match="2 rows of outputs need a generator each, not 1"):
+        bound.sample(outputs, streams[:1])
     assert bound.greedy(torch.from_numpy(outputs), "mean").tolist() == [[-0.5, 2.5]] * 2
 
 

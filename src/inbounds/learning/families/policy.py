@@ -156,7 +156,15 @@ class Policy:
     def sample(
         self, outputs: NDArray[Any], generators: Sequence[np.random.Generator], mode: ActionMode = "clip"
     ) -> NDArray[Any]:
-        """Return an action `[B, A]` to execute for each row of the network's outputs `[B, 2A]`, by a generator each."""
+        """Return an action `[B, A]` to execute for each row of the network's outputs `[B, 2A]`, by a generator each.
+
+        Raises:
+            ValueError: there are more rows than generators, or fewer.
+        """
+        if len(generators) != len(outputs):
+            raise ValueError(
+                f"{len(outputs)} rows of outputs need a generator each, not {len(generators)} in all"
+            )
         draw = self.law.sampler(generators, 1, self.act_dim, outputs.dtype)
         return self.execute(draw(self.parameters(outputs, np), 0), mode)
 
