@@ -24,7 +24,7 @@ MEASURED = {
 from inbounds.learning import Trainer
 rollout = Trainer(replace(config, policy=quiet, seeds=(0, 1))).collector.collect(200)
 executed(rollout.action.numpy())
-assert action.shape == (6,) and len(run.policies) == 10
+assert action.shape == (2,) and len(run.policies) == 10
 """,
     "stable-baselines3": """
 import torch

@@ -1,5 +1,6 @@
 """Who wins, in words: the laws by their intervals, what was not run, and links to a place that exists."""
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -75,7 +76,11 @@ def test_the_finding_follows_the_rows() -> None:
     said = winners.finding(winners.by_test(["higher", "lower", ""]), rows, "beta", "ppo")
     assert said == (
         "Under PPO the Beta ends above the clipped Gaussian on 1 of 3 robots, and below it on 1 (found). "
-        "When both start equally quiet, the Beta ends above on 1 of 2 robots, and below on none (found on 1)."
+        "When both start equally quiet, the Beta ends above on 1 of 2 robots, below on none (found on 1)."
     )
+    fresh = [dataclasses.replace(each, study=2) for each in rows]
+    free = "both start equally quiet, and the Gaussian has a free σ, the Beta"
+    assert free in winners.finding("x", fresh, "beta", "ppo")
+    assert free not in winners.finding("x", [rows[0], fresh[1]], "beta", "ppo")
     assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("quiet")[2]
     assert "not compared yet" in winners.finding("x", [], "beta", "ppo")

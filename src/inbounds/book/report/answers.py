@@ -35,8 +35,9 @@ def too_small(row: Evidence) -> bool:
 def first_choice(rows: Sequence[Evidence]) -> str:
     """Return the law to begin with, by a rule that knows no law's name; empty where none leads.
 
-    A law leads that lies above the equally quiet Gaussian somewhere, by either endpoint, and below it nowhere. Of two,
-    the one that does so on more robots and endpoints; of two alike, neither.
+    A law leads that counts as above the equally quiet Gaussian somewhere, by either endpoint, and as below it nowhere
+    (`sign`: what is too small to matter is neither). Of two, the one that does so on more robots and endpoints; of two
+    alike, neither.
 
     Args:
         rows: of one algorithm, both endpoints.
@@ -61,8 +62,12 @@ def advice(algorithm: str, law: str) -> str:
         >>> advice("trpo", "")
         'Under TRPO, take the law that your library has.'
     """
-    names = {"": "law that your library has", "beta": "Beta", "logit-normal": "logit-normal"}
-    return f"Under {algorithm.upper()}, take the {names[law]}."
+    told = {
+        "": "take the law that your library has",
+        "beta": "try the Beta",
+        "logit-normal": "try the logit-normal",
+    }
+    return f"Under {algorithm.upper()}, {told[law]}."
 
 
 def counted(rows: Sequence[Evidence]) -> str:

@@ -98,7 +98,8 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     signs = [sign(row) for row in here]
     grades = f" ({graded(here)})" if any(signs) else ""
     above, below = _of(signs.count(1), len(here)), _none(signs.count(-1))
-    return f"{first} When both start equally quiet, the {name} ends above on {above}, and below on {below}{grades}."
+    free = ", and the Gaussian has a free σ" if all(row.study == 2 for row in here) else ""
+    return f"{first} When both start equally quiet{free}, the {name} ends above on {above}, below on {below}{grades}."
 
 
 def by_test(words: Sequence[str]) -> str:
