@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from rich.console import Console
 
@@ -369,7 +370,7 @@ def test_a_cell_that_may_not_be_read_is_no_damaged_one(
         raise PermissionError(13, "Permission denied", "a.parquet")
 
     for name in ("read_table", "read_schema"):
-        monkeypatch.setattr(store.pq, name, refuse)
+        monkeypatch.setattr(pq, name, refuse)
     for read in (store.read_cell, store.read_metadata):
         with pytest.raises(PermissionError):
             read("a.parquet")
