@@ -32,6 +32,8 @@ from inbounds.study.cell import Cell, digest_of
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
+OF_MANY_CELLS = ("nothing", "records")
+"""Files of `evaluations` that are of no one cell."""
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
 EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
@@ -268,13 +270,19 @@ def read_metadata(path: str | Path) -> dict[str, Any]:
     return read_about(path, restore(path), {"config", "study_version", "id"})
 
 
-def restore(path: str | Path, again: str = "run the cell again") -> str:
-    """Return what to do about a damaged result.
+def restore(path: str | Path) -> str:
+    """Return what to do about a damaged result, which depends on what makes the files of its folder.
 
-    Args:
-        path: of the file.
-        again: how it is made anew.
+    Example:
+        >>> restore("results/evaluations/standard-ant-ppo-beta.parquet").partition("delete it and ")[2]
+        'play the policies again (inbounds study evaluate standard-ant-ppo-beta)'
+        >>> restore("results/cells/standard-ant-ppo-beta.parquet").partition("delete it and ")[2]
+        'run the cell again'
     """
+    path, again = Path(path), "run the cell again"
+    if path.parent.name == "evaluations":
+        one = "" if path.stem in OF_MANY_CELLS else f" {path.stem}"
+        again = f"play the policies again (inbounds study evaluate{one})"
     return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and {again}"
 
 

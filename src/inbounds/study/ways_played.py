@@ -19,10 +19,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from inbounds.learning import FAMILIES
-from inbounds.learning.storage.parquet import read_table
 from inbounds.learning.storage.whole_files import damaged
+from inbounds.study import store
 from inbounds.study.grid import ROBOTS, Cell
-from inbounds.study.store import StudyFolder, restore
+from inbounds.study.store import StudyFolder
 
 Floats = NDArray[np.float64]
 
@@ -123,10 +123,9 @@ def read_ways(folder: StudyFolder, cell: Cell) -> dict[str, Played]:
         True
     """
     path = evaluation_file(folder, cell)
-    remedy = restore(path, f"play the policies again (inbounds study evaluate {cell.id})")
-    table = read_table(path, remedy)
+    table = store.read_cell(path)
     if said := wrong_ways(cell, table):
-        raise damaged(path, said, remedy)
+        raise damaged(path, said, store.restore(path))
     names, shape = table["way"].to_pylist(), (len(cell.kept_seeds), EPISODES[cell.robot])
     found = {}
     for way in ways_of(cell.family):
@@ -150,8 +149,7 @@ def read_nothing(folder: StudyFolder) -> dict[str, Floats]:
         >>> nothing["Ant"].shape, bool((nothing["Ant"] > 800).all())  # a point a step for not lying on its back
         ((10, 3), True)
     """
-    path = nothing_file(folder)
-    table = read_table(path, restore(path, "play it again (inbounds study evaluate)"))
+    table = store.read_cell(nothing_file(folder))
     robots = np.array(table["robot"].to_pylist())
     returns = table["return"].to_numpy()
     return {
@@ -166,7 +164,7 @@ def wrong_ways(cell: Cell, table: pa.Table) -> str:
     Example:
         >>> from inbounds.study import select
         >>> cell, = select(["standard-hopper-ppo-beta"])
-        >>> rows = read_table(evaluation_file(StudyFolder(), cell))  # in the project's folder
+        >>> rows = store.read_cell(evaluation_file(StudyFolder(), cell))  # in the project's folder
         >>> wrong_ways(cell, rows), wrong_ways(cell, rows.drop_columns(["return"]))
         ('', 'column return is missing')
     """

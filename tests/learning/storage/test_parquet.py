@@ -46,6 +46,11 @@ def test_a_flipped_bit_a_lost_end_and_a_foreign_table_are_told_with_the_remedy(p
         config_of(read_table(path))
 
 
+def test_a_table_of_ours_that_is_no_runs_has_no_configuration(path: Path) -> None:
+    with pytest.raises(ValueError, match="of no run"):
+        config_of(read_table(path))
+
+
 @pytest.mark.parametrize("said", ["no JSON", "[1]", "null"])
 def test_words_that_are_no_entries_are_damage(said: str, path: Path) -> None:
     path.write_bytes(parquet_bytes(TABLE, said))

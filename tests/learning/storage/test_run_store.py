@@ -15,7 +15,7 @@ from scipy import stats
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import Trainer, preset
-from inbounds.learning.storage.run_metadata import config_from, metadata_of
+from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of
 from inbounds.learning.storage.run_store import (
     COLUMNS,
     config_of,
@@ -235,6 +235,9 @@ def test_files_of_another_origin(tmp_path: Path) -> None:
     path = tmp_path / "policies.safetensors"
     safetensors.numpy.save_file({"weight": np.zeros(3)}, path)
     with pytest.raises(DamagedFileError, match="of another origin"):
+        load_policies(path)
+    safetensors.numpy.save_file({"weight": np.zeros(3)}, path, {METADATA_KEY: "null"})
+    with pytest.raises(DamagedFileError, match="inbounds did not write it"):
         load_policies(path)
     torch.save({"epoch": 3}, tmp_path / "checkpoint.pt")
     with pytest.raises(DamagedFileError, match="it holds no run"):

@@ -1,6 +1,7 @@
 """The dial's map: a run repeats itself, what is stored is whole, the rule classes as `results/DIAL.md` says."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pyarrow as pa
 import pytest
 
 from inbounds.cli import main
+from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.dial import running
 from inbounds.study.dial.cells import PILOT_SEEDS, POLICIES, SEEDS, DialCell, dial_cells
@@ -148,6 +150,13 @@ def test_a_cell_or_a_checksum_that_is_cut_short_is_called_damaged(folder: DialFo
     folder.cell_file(SMALL[0]).write_bytes(b"")
     with pytest.raises(DamagedFileError, match="delete it, and run the command again"):
         folder.finished(SMALL[0])
+    for config in ({}, None):
+        about = {name: "" for name in ("seconds", "commit", "engine", "versions", "processor")} | {
+            "config": config
+        }
+        folder.cell_file(SMALL[0]).write_bytes(parquet_bytes(pa.table({}), json.dumps(about)))
+        with pytest.raises(DamagedFileError, match="delete it, and run the command again"):
+            folder.finished(SMALL[0])
     folder.map_file.write_bytes(b"PAR1")
     (folder.results / "checksums.txt").write_text("")
     with pytest.raises(DamagedFileError, match="git checkout"):

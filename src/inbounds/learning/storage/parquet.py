@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from inbounds.learning.storage.run_metadata import METADATA_KEY
+from inbounds.learning.storage.run_metadata import METADATA_KEY, parsed
 from inbounds.learning.storage.whole_files import damaged
 
 
@@ -50,9 +49,7 @@ def read_table(path: str | Path, remedy: str = "") -> pa.Table:
         return pq.read_table(path, page_checksum_verification=True)
 
 
-def read_about(
-    path: str | Path, remedy: str = "", keys: frozenset[str] | set[str] = frozenset()
-) -> dict[str, Any]:
+def read_about(path: str | Path, remedy: str = "", keys: Collection[str] = ()) -> dict[str, Any]:
     """Read what a stored table says of itself, without its rows.
 
     Args:
@@ -66,7 +63,7 @@ def read_about(
     """
     with _damage_named(path, remedy):
         found = about_of(pq.read_schema(path))
-        if missing := sorted(keys - found.keys()):
+        if missing := [key for key in keys if key not in found]:
             raise ValueError(f"it does not say its {missing[0]}")
         return found
 
@@ -75,16 +72,13 @@ def about_of(schema: pa.Schema) -> dict[str, Any]:
     """Return what a stored table says of itself, from its schema.
 
     Raises:
-        ValueError: it says nothing; other software wrote it.
+        ValueError: it says nothing; other software wrote it, or an operation on the table has lost it.
 
     Example:
         >>> about_of(pa.schema([], {METADATA_KEY: '{"id": "ours"}'}))
         {'id': 'ours'}
     """
-    found = json.loads((schema.metadata or {}).get(METADATA_KEY.encode(), "null"))
-    if not isinstance(found, dict):
-        raise ValueError("the table does not say where it comes from: inbounds did not write it")
-    return found
+    return parsed((schema.metadata or {}).get(METADATA_KEY.encode()))
 
 
 @contextlib.contextmanager

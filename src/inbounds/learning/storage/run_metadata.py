@@ -32,6 +32,22 @@ def metadata_of(config: TrainConfig, **more: str) -> str:
     return json.dumps({"format": FORMAT, "config": describe(config), "versions": versions()} | more)
 
 
+def parsed(metadata: str | bytes | None) -> dict[str, Any]:
+    """Return what a file says of itself, from the words that it keeps under `METADATA_KEY`.
+
+    Raises:
+        ValueError: it says nothing; other software wrote it, or what it said was lost on the way.
+
+    Example:
+        >>> parsed('{"id": "ours"}')
+        {'id': 'ours'}
+    """
+    found = json.loads(metadata or "null")
+    if not isinstance(found, dict):
+        raise ValueError("it does not say where it comes from: inbounds did not write it, or that was lost")
+    return found
+
+
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that decide the bits of a result."""
     found = {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
@@ -48,7 +64,8 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
         metadata: the parsed JSON.
 
     Raises:
-        ValueError: another version of the package wrote it, with options that this one does not know.
+        ValueError: it is of no run, or another version of the package wrote it, with options that this one does not
+            know.
 
     Example:
         >>> from inbounds.learning import preset
@@ -56,6 +73,8 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
         >>> config_from(json.loads(metadata_of(config))) == config
         True
     """
+    if not {"format", "config"} <= metadata.keys():
+        raise ValueError("the file is of no run: it has no configuration of one")
     if metadata["format"] > FORMAT:
         raise ValueError(f"the file has format {metadata['format']}: update inbounds to read it")
     try:

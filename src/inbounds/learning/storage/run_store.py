@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_table
-from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of
+from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of, parsed
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import damaged, find, write_whole
 
@@ -127,7 +126,6 @@ def read_curves(run: str | Path) -> pa.Table:
     Raises:
         FileNotFoundError: there are none.
         DamagedFileError: the file is damaged.
-        ValueError: another version of the package wrote it, with options that this one does not know.
     """
     return read_table(find(run, CURVES_FILE))
 
@@ -203,11 +201,11 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
     path.open("rb").close()  # safetensors says of a file that may not be read that there is none
     try:
         with safetensors.safe_open(path, "np") as file:
-            metadata = json.loads((file.metadata() or {})[METADATA_KEY])
+            metadata = parsed((file.metadata() or {}).get(METADATA_KEY))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no dictionary)
     except PermissionError:  # the file may be sound
         raise
-    except (safetensors.SafetensorError, OSError, KeyError, ValueError) as error:
+    except (safetensors.SafetensorError, OSError, ValueError) as error:
         raise damaged(path, error) from error
     if metadata.get("sha256") != _digest(tensors):
         raise damaged(path, "its checksum is wrong")

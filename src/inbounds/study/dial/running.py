@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 from inbounds.learning import Trainer, train
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_about, read_table
 from inbounds.learning.storage.stored_config import changed_fields, describe
-from inbounds.learning.storage.whole_files import DamagedFileError, held, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, damaged, held, write_whole
 from inbounds.study.dial.cells import DialCell, dial_cells
 from inbounds.study.dial.task import DialEnv
 from inbounds.study.running.provenance import provenance
@@ -30,6 +30,7 @@ from inbounds.study.store import ROOT
 
 MEASURED = ("score", "saturation", "action_std", "kl")
 RAN_ON = ("commit", "engine", "versions", "processor")
+REMEDY = "delete it, and run the command again"
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,15 @@ class DialFolder:
         path = self.cell_file(cell)
         if not path.is_file():
             return False
-        return is_of(cell, self.about(cell)["config"])
+        try:
+            return is_of(cell, self.about(cell)["config"])
+        except (AttributeError, KeyError, TypeError) as error:  # it has a configuration of something else
+            raise damaged(path, error, REMEDY) from error
 
     def about(self, cell: DialCell) -> dict[str, Any]:
         """Return what a finished cell's file says of itself."""
         keys = {"config", "seconds", *RAN_ON}
-        return read_about(self.cell_file(cell), "delete it, and run the command again", keys)
+        return read_about(self.cell_file(cell), REMEDY, keys)
 
     def read(self) -> pa.Table:
         """Read the map, after comparing it with its checksum.
