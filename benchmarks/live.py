@@ -27,7 +27,6 @@ from benchmarks.run import machine, versions
 from inbounds.book.live import record
 from inbounds.book.live.export import robot as robot_of
 from inbounds.book.live.in_node import run, run_cell
-from inbounds.learning.storage.run_store import load_policies
 from inbounds.robots.vector_env import RobotVectorEnv
 from inbounds.study.grid import ROBOTS, Cell, select
 from inbounds.study.store import StudyFolder
@@ -68,7 +67,7 @@ def one_step(cell: Cell, count: int) -> dict[str, float]:
 
 def free_run(cell: Cell, starts: int, steps: int) -> list[int]:
     """Return after how many env steps the observations part, one number a start; `steps` where they do not."""
-    policy = load_policies(StudyFolder.shipped().policy_files(cell)[0])[0]
+    policy = StudyFolder.shipped().load_policies(cell)[0]
     played, states = [], []
     for start in range(starts):
         with closing(RobotVectorEnv(cell.config.env, 1)) as env:

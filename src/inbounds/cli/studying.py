@@ -288,8 +288,7 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
         chooser = random.Random(command.random_seed)
         rerun = tuple(chooser.sample(finished, min(command.random, len(finished))))
     findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
-    if rerun is None:
-        findings += check_ways(cells, command.folder(), show)
+    findings += check_ways(cells if rerun is None else rerun, command.folder(), show)
     return 0 if all(finding.ok for finding in findings) else 1
 
 

@@ -10,6 +10,7 @@ A cell is finished when its Parquet file is there; that is written last, whole, 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import shlex
@@ -22,7 +23,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from inbounds.learning import TrainConfig
+from inbounds.learning import TrainConfig, TrainedPolicy, load_policies
 from inbounds.learning.storage.parquet import read_about, read_table
 from inbounds.learning.storage.run_metadata import metadata_of
 from inbounds.learning.storage.run_store import COLUMNS as OF_A_RUN
@@ -141,14 +142,38 @@ class StudyFolder:
         path = self.cell_file(cell)
         if not path.is_file():
             return "missing"
+        if self.damaged_files(cell):
+            return "damaged"
+        return "finished" if is_of(cell, read_metadata(path)) else "another configuration"
+
+    def damaged_files(self, cell: Cell) -> list[Path]:
+        """Return which files of a finished cell are not there, or are not those of their checksums or of the study."""
         sums = self.checksums()
-        try:
-            metadata = read_metadata(path)
-        except DamagedFileError:
-            return "damaged"
-        if any(not file.is_file() or sums.get(self._name(file)) != sha256(file) for file in self.files(cell)):
-            return "damaged"
-        return "finished" if is_of(cell, metadata) else "another configuration"
+        wrong = [f for f in self.files(cell) if not f.is_file() or sums.get(self._name(f)) != sha256(f)]
+        with contextlib.suppress(FileNotFoundError):
+            try:
+                read_metadata(self.cell_file(cell))
+            except DamagedFileError:
+                wrong = wrong or [self.cell_file(cell)]
+        return wrong
+
+    def load_policies(self, cell: Cell) -> list[TrainedPolicy]:
+        """Load the policies that a cell has kept.
+
+        Raises:
+            FileNotFoundError: there are none.
+            DamagedFileError: their file is damaged.
+
+        Example:
+            >>> from inbounds.study.grid import select
+            >>> cell, = select(["standard-hopper-ppo-beta"])
+            >>> StudyFolder().load_policies(cell)[9]  # in the project's folder
+            <TrainedPolicy: beta, ppo, Hopper-v5, seed 9>
+        """
+        path = self.policy_files(cell)[0]
+        if not path.is_file():
+            raise FileNotFoundError(f"there is no {path}: {make(path)}")
+        return load_policies(path, restore(path))
 
     def checksums(self) -> dict[str, str]:
         """Return SHA-256 by file name, relative to the results; empty if there is no list."""
@@ -257,17 +282,24 @@ def read_cell(path: str | Path) -> pa.Table:
         >>> read_cell("results/cells/standard-hopper-ppo-beta.parquet").num_rows  # 500 epochs of ten seeds
         5000
     """
-    return read_table(path, restore(path))
+    try:
+        return read_table(path, restore(path))
+    except FileNotFoundError as error:
+        raise FileNotFoundError(f"there is no {path}: {make(path)}") from error
 
 
-def read_metadata(path: str | Path) -> dict[str, Any]:
+def read_metadata(path: str | Path, *keys: str) -> dict[str, Any]:
     """Return what a cell's file says of itself.
+
+    Args:
+        path: of the file.
+        *keys: entries that it must have beside configuration, version and name.
 
     Raises:
         FileNotFoundError: there is no such file.
-        DamagedFileError: it is damaged.
+        DamagedFileError: it is damaged, or lacks a key.
     """
-    return read_about(path, restore(path), {"config", "study_version", "id"})
+    return read_about(path, restore(path), ("config", "study_version", "id", *keys))
 
 
 def restore(path: str | Path) -> str:
@@ -275,15 +307,29 @@ def restore(path: str | Path) -> str:
 
     Example:
         >>> restore("results/evaluations/standard-ant-ppo-beta.parquet").partition("delete it and ")[2]
-        'play the policies again (inbounds study evaluate standard-ant-ppo-beta)'
-        >>> restore("results/cells/standard-ant-ppo-beta.parquet").partition("delete it and ")[2]
-        'run the cell again'
+        'play the policies (inbounds study evaluate standard-ant-ppo-beta)'
+        >>> restore("results/policies/standard-ant-ppo-beta.safetensors").partition("or ")[2]
+        'delete results/cells/standard-ant-ppo-beta.parquet and run the cell (inbounds study run standard-ant-ppo-beta)'
     """
-    path, again = Path(path), "run the cell again"
-    if path.parent.name == "evaluations":
-        one = "" if path.stem in OF_MANY_CELLS else f" {path.stem}"
-        again = f"play the policies again (inbounds study evaluate{one})"
-    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete it and {again}"
+    path = Path(path)
+    what = "it"
+    if path.parent.name == "policies":  # the cell counts as run while its rows are there
+        what = str(path.parent.parent / "cells" / f"{path.stem}.parquet")
+    return f"restore it (git checkout -- {shlex.quote(str(path))}), or delete {what} and {make(path)}"
+
+
+def make(path: str | Path) -> str:
+    """Return how a result is made, which depends on its folder.
+
+    Example:
+        >>> make("results/cells/standard-ant-ppo-beta.parquet")
+        'run the cell (inbounds study run standard-ant-ppo-beta)'
+    """
+    path = Path(path)
+    if path.parent.name != "evaluations":
+        return f"run the cell (inbounds study run {path.stem})"
+    one = "" if path.stem in OF_MANY_CELLS else f" {path.stem}"
+    return f"play the policies (inbounds study evaluate{one})"
 
 
 # ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch

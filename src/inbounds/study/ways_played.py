@@ -19,7 +19,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from inbounds.learning import FAMILIES
-from inbounds.learning.storage.whole_files import damaged
+from inbounds.learning.storage.whole_files import DamagedFileError, damaged
 from inbounds.study import store
 from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.store import StudyFolder
@@ -111,7 +111,7 @@ def read_ways(folder: StudyFolder, cell: Cell) -> dict[str, Played]:
 
     Raises:
         FileNotFoundError: they have not been played.
-        DamagedFileError: the file is damaged, or its rows are not those of the cell.
+        DamagedFileError: the file is damaged, its rows are not those of the cell, or other policies were played.
 
     Example:
         >>> from inbounds.study import select
@@ -126,6 +126,8 @@ def read_ways(folder: StudyFolder, cell: Cell) -> dict[str, Played]:
     table = store.read_cell(path)
     if said := wrong_ways(cell, table):
         raise damaged(path, said, store.restore(path))
+    if said := other_policies(folder, cell):
+        raise DamagedFileError(said)
     names, shape = table["way"].to_pylist(), (len(cell.kept_seeds), EPISODES[cell.robot])
     found = {}
     for way in ways_of(cell.family):
@@ -156,6 +158,22 @@ def read_nothing(folder: StudyFolder) -> dict[str, Floats]:
         robot: returns[robots == robot].reshape(-1, EPISODES[robot])
         for robot in dict.fromkeys(robots.tolist())
     }
+
+
+def other_policies(folder: StudyFolder, cell: Cell) -> str:
+    """Return why a cell's evaluation is not one of the policies that are there; empty where it is.
+
+    Raises:
+        FileNotFoundError: they have not been played.
+        DamagedFileError: the file is damaged.
+    """
+    path, policies = evaluation_file(folder, cell), folder.policy_files(cell)[0]
+    metadata = store.read_metadata(path, "policies", "session")
+    if not policies.is_file():
+        return f"{policies} is missing: {store.restore(policies)}"
+    if not store.is_of(cell, metadata) or metadata["policies"] != store.sha256(policies):
+        return f"{path} is of other policies than {policies}: {store.make(path)}"
+    return ""
 
 
 def wrong_ways(cell: Cell, table: pa.Table) -> str:

@@ -14,7 +14,6 @@ from inbounds.book.live import export, site
 from inbounds.book.live.element import POLICIES, live_robot, style_sheet
 from inbounds.book.live.packages import without_custom_sections
 from inbounds.learning import Trainer
-from inbounds.learning.storage.run_store import load_policies
 from inbounds.study.grid import ROBOTS, select
 from inbounds.study.store import StudyFolder
 
@@ -46,7 +45,7 @@ def test_every_choice_of_the_page_has_its_file(written: Path) -> None:
 def test_a_policy_s_numbers_are_the_study_s(written: Path) -> None:
     (cell,) = select(["standard-ant-trpo-logit-normal"])
     stored = read(written / "policies" / "ant-trpo-logit-normal-4.js")
-    policy = load_policies(StudyFolder.shipped().policy_files(cell)[0])[4]
+    policy = StudyFolder.shipped().load_policies(cell)[4]
     data = gzip.decompress(base64.b64decode(stored["numbers"]))
     count = sum(out * (into + 1) for into, out in itertools.pairwise(stored["sizes"]))
     np.testing.assert_array_equal(

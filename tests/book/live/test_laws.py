@@ -9,7 +9,6 @@ from inbounds.book.live import export
 from inbounds.book.live.in_node import run
 from inbounds.learning import FAMILIES, Limits
 from inbounds.learning.families.policy import Policy, PolicyConfig
-from inbounds.learning.storage.run_store import load_policies
 from inbounds.study.grid import select
 from inbounds.study.store import StudyFolder
 
@@ -112,7 +111,7 @@ def test_a_policy_acts_as_in_python(family: str) -> None:
     """Float64 sums in JavaScript, float32 in Python: they agree to a few float32 roundings."""
     (cell,) = select([f"standard-humanoid-ppo-{family}"])
     stored = next(iter(export.policies(cell, StudyFolder.shipped())))[1]
-    trained = load_policies(StudyFolder.shipped().policy_files(cell)[0])[0]
+    trained = StudyFolder.shipped().load_policies(cell)[0]
     obs = trained._normalizer.mean[0] + RNG.normal(size=(20, 348)) * 0.3  # type: ignore[union-attr]
     code = """
     const policy = new live.Policy(values.stored, await live.unpack(values.stored.numbers));

@@ -1,5 +1,6 @@
 """Stored tables: what they say of themselves, and how a damaged one is told from a sound one."""
 
+import errno
 import json
 from pathlib import Path
 
@@ -63,7 +64,27 @@ def test_a_missing_entry_is_named(path: Path) -> None:
         read_about(path, keys={"id", "seconds"})
 
 
-def test_a_file_that_is_not_there_is_no_damage(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_no_damage_and_a_folder_is(path: Path) -> None:
     for read in (read_table, read_about):
         with pytest.raises(FileNotFoundError):
-            read(tmp_path / "none.parquet")
+            read(path.with_name("none.parquet"))
+        with pytest.raises(DamagedFileError, match="is a directory"):
+            read(path.parent)  # which PyArrow would read as one table
+
+
+@pytest.mark.parametrize(
+    "error",
+    [PermissionError(errno.EACCES, "no"), OSError(errno.EMFILE, "too many"), pa.ArrowMemoryError("no room")],
+)
+def test_what_says_nothing_of_the_file_is_no_damage(
+    path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(pq, "ParquetFile", fail)
+    monkeypatch.setattr(pq, "read_schema", fail)
+    for read in (read_table, read_about):
+        with pytest.raises(type(error)) as found:
+            read(path)
+        assert found.value is error

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,8 @@ import pyarrow as pa
 import pytest
 
 from inbounds.cli import main
-from inbounds.learning.storage.parquet import parquet_bytes
-from inbounds.learning.storage.whole_files import DamagedFileError
+from inbounds.learning.storage.parquet import parquet_bytes, read_table
+from inbounds.learning.storage.whole_files import DamagedFileError, held
 from inbounds.study.dial import running
 from inbounds.study.dial.cells import PILOT_SEEDS, POLICIES, SEEDS, DialCell, dial_cells
 from inbounds.study.dial.outcomes import (
@@ -49,8 +50,38 @@ def test_a_run_is_resumed_packed_and_read(folder: DialFolder) -> None:
     again = run_cell(SMALL[3])
     np.testing.assert_array_equal(table["score"].to_numpy()[-4:], again["score"].to_numpy())
     folder.map_file.write_bytes(folder.map_file.read_bytes()[:-1])
-    with pytest.raises(DamagedFileError, match="restore it"):
+    with pytest.raises(
+        DamagedFileError, match=r"restore both .*or make them again \(inbounds study dial run\)"
+    ):
         folder.read()
+    folder.sum_file.unlink()
+    with pytest.raises(DamagedFileError, match=r"it is not the file that .*checksums\.txt lists"):
+        folder.read()
+    assert run_cells(SMALL, folder)  # mends it
+    assert folder.read().equals(table)
+
+
+def test_two_runs_in_one_folder_are_refused_in_words(folder: DialFolder) -> None:
+    folder.work.mkdir()
+    with ThreadPoolExecutor(1) as other, held(folder.work):
+        found = other.submit(run_cells, SMALL[:1], folder).exception()
+    assert isinstance(found, BlockingIOError)
+    assert (
+        str(found)
+        == f"another process runs in {folder.work}: wait until it is done, or choose another --work"
+    )
+
+
+@pytest.mark.parametrize("key", ["seconds", "commit"])
+def test_a_cell_that_does_not_say_how_it_was_made_is_damaged(folder: DialFolder, key: str) -> None:
+    run_cells(SMALL[:1], folder)
+    path, about = folder.cell_file(SMALL[0]), folder.about(SMALL[0])
+    del about[key]
+    path.write_bytes(parquet_bytes(read_table(path), json.dumps(about)))
+    with pytest.raises(
+        DamagedFileError, match=f"it does not say its {key}.*delete it, and run the command again"
+    ):
+        folder.finished(SMALL[0])
 
 
 def test_another_configuration_is_not_taken_for_the_cell(folder: DialFolder) -> None:
@@ -158,6 +189,6 @@ def test_a_cell_or_a_checksum_that_is_cut_short_is_called_damaged(folder: DialFo
         with pytest.raises(DamagedFileError, match="delete it, and run the command again"):
             folder.finished(SMALL[0])
     folder.map_file.write_bytes(b"PAR1")
-    (folder.results / "checksums.txt").write_text("")
+    folder.sum_file.write_text("")
     with pytest.raises(DamagedFileError, match="git checkout"):
         folder.read()

@@ -369,7 +369,7 @@ def test_a_cell_that_may_not_be_read_is_no_damaged_one(
     def refuse(*args: Any, **more: Any) -> None:
         raise PermissionError(13, "Permission denied", "a.parquet")
 
-    for name in ("read_table", "read_schema"):
+    for name in ("ParquetFile", "read_schema"):
         monkeypatch.setattr(pq, name, refuse)
     for read in (store.read_cell, store.read_metadata):
         with pytest.raises(PermissionError):

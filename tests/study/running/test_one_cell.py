@@ -303,6 +303,23 @@ def test_a_damaged_result_is_not_overwritten(tmp_path: Path) -> None:
         assert path.read_bytes() == damage
 
 
+def test_the_damaged_companion_is_named_and_what_to_delete(tmp_path: Path) -> None:
+    cell, folder = small_cell(epochs=1, keeps_policies=True), folder_in(tmp_path)
+    run_cell(cell, folder)
+    for path in folder.policy_files(cell):
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-10])
+        with pytest.raises(
+            StudyError, match=rf"{path}, or its line .*restore it .*delete {folder.cell_file(cell)} "
+        ):
+            run_cell(cell, folder)
+        path.write_bytes(whole)
+    assert run_cell(cell, folder) == "was finished"
+    folder.policy_files(cell)[0].unlink()
+    folder.cell_file(cell).unlink()
+    assert run_cell(cell, folder) == "finished"  # what the message says helps
+
+
 def test_results_of_another_configuration_are_not_mixed_in(tmp_path: Path) -> None:
     folder = folder_in(tmp_path)
     run_cell(small_cell(epochs=10), folder)

@@ -240,6 +240,51 @@ def test_rows_of_other_policies_are_noticed(folder: StudyFolder) -> None:
     assert not checks.check_ways([cell], folder)[0].ok
 
 
+def test_an_evaluation_of_other_policies_is_not_read_and_is_played_again(folder: StudyFolder) -> None:
+    cell, other = cell_of("gaussian"), cell_of("logit-normal")
+    expected = ways(folder, "gaussian")
+    rewrite(folder, cell, "return", lambda values: values + 1, policies="0" * 64)
+    with pytest.raises(DamagedFileError, match=f"of other policies.*inbounds study evaluate {cell.id}"):
+        ways(folder, "gaussian")
+    assert evaluate_cells([cell, other], folder) == [cell]
+    for way, played in ways(folder, "gaussian").items():
+        np.testing.assert_array_equal(played.returns, expected[way].returns)
+    assert all(finding.ok for finding in check_sums(folder))
+
+
+def test_an_evaluation_without_its_policies_says_so(folder: StudyFolder) -> None:
+    cell = cell_of("gaussian")
+    policies = folder.policy_files(cell)[0]
+    policies.write_bytes(policies.read_bytes()[:-9])
+    with pytest.raises(DamagedFileError, match=f"delete .*cells/{cell.id}.parquet and run the cell"):
+        play_cell(cell, folder)
+    policies.unlink()
+    with pytest.raises(FileNotFoundError, match=f"inbounds study run {cell.id}"):
+        play_cell(cell, folder)
+    with pytest.raises(DamagedFileError, match=f"{cell.id}.safetensors is missing"):
+        ways(folder, "gaussian")
+
+
+@pytest.mark.parametrize("key", ["session", "policies"])
+def test_an_evaluation_that_does_not_say_its_origin_is_damaged(folder: StudyFolder, key: str) -> None:
+    cell = cell_of("gaussian")
+    path = evaluation_file(folder, cell)
+    about = store.read_metadata(path)
+    del about[key]
+    folder.publish({path: parquet_bytes(read_cell(path), json.dumps(about))})
+    assert f"it does not say its {key}" in checks.wrong_evaluation(cell, folder)
+    assert not checks.check_replay(cell, folder).ok
+
+
+def test_what_was_not_played_says_how_to(folder: StudyFolder) -> None:
+    nothing_file(folder).unlink()
+    with pytest.raises(FileNotFoundError, match=r"\(inbounds study evaluate\)"):
+        read_nothing(folder)
+    nothing_file(folder).write_bytes(b"cut")
+    with pytest.raises(DamagedFileError, match=r"restore it .*nothing.parquet.*\(inbounds study evaluate\)"):
+        read_nothing(folder)
+
+
 def test_rows_that_are_not_the_cells_are_not_read(folder: StudyFolder) -> None:
     cell = cell_of("gaussian")
     table = read_cell(evaluation_file(folder, cell))

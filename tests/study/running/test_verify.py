@@ -12,6 +12,7 @@ import pyarrow as pa
 import pytest
 
 import inbounds.robots
+from inbounds.cli import main, studying
 from inbounds.learning import TrainConfig, Trainer, ppo
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import save_policies
@@ -224,6 +225,19 @@ def test_a_damaged_cell_ends_a_command_in_one_line(command: str, tmp_path: Path)
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert "column return_mean is missing" in err
     assert "git checkout -- " in err
+
+
+@pytest.mark.parametrize(
+    ("words", "looked_at"), [([], 2), (["--rerun", "standard-hopper-ppo-beta"], 1), (["--random", "1"], 1)]
+)
+def test_of_the_cells_that_run_again_the_evaluations_are_checked_too(
+    words: list[str], looked_at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen: list[int] = []
+    monkeypatch.setattr(studying, "verify", lambda *_, **__: [])
+    monkeypatch.setattr(studying, "check_ways", lambda cells, *_: chosen.append(len(cells)) or [])
+    assert main(["study", "verify", "standard-hopper-ppo-beta", "standard-hopper-ppo-gaussian", *words]) == 0
+    assert chosen == [looked_at]
 
 
 @pytest.mark.parametrize("command", ["report", "ledger", "verify"])

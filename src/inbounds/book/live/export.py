@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.seeding import SeedStreams
-from inbounds.learning.storage.run_store import load_policies
 from inbounds.robots.messages import install_handler
 from inbounds.robots.tasks import Task
 from inbounds.robots.vector_env import TASKS
@@ -117,7 +116,7 @@ def policies(cell: Cell, folder: StudyFolder) -> Iterator[tuple[str, dict[str, A
         ('hopper-ppo-beta-0', [11, 64, 64, 6])
     """
     path = folder.policy_files(cell)[0]
-    trained = load_policies(path)  # looks at the checksum, too
+    trained = folder.load_policies(cell)  # looks at the checksum, too
     tensors = safetensors.numpy.load_file(path)
     depth = len(cell.config.network.hidden_sizes) + 1
     for i, policy in enumerate(trained):

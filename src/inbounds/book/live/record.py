@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from inbounds.learning.storage.run_store import load_policies
 from inbounds.robots.vector_env import RobotVectorEnv
 from inbounds.study.grid import Cell
 from inbounds.study.store import StudyFolder
@@ -42,7 +41,7 @@ def steps(cell: Cell, seed: int, count: int = 50, apart: int = 7) -> Iterator[di
         >>> len(first["obs"]), len(first["action"]), first["terminated"]
         (11, 3, False)
     """
-    policy = load_policies(StudyFolder.shipped().policy_files(cell)[0])[cell.config.seeds.index(seed)]
+    policy = StudyFolder.shipped().load_policies(cell)[cell.config.seeds.index(seed)]
     rng = np.random.default_rng(seed)
     with closing(RobotVectorEnv(cell.config.env, 1)) as env:
         obs, _ = env.reset(seed=seed)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inbounds.book.drawing import figures
-from inbounds.learning import TrainedPolicy, load_policies
+from inbounds.learning import TrainedPolicy
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import bootstrap, mean_of, minus
 
@@ -70,4 +70,4 @@ def final_policies(outcomes: Outcomes, outcome: Outcome) -> list[TrainedPolicy]:
     cell = outcome.cell
     if not cell.keeps_policies:
         raise FileNotFoundError(f"{cell.id}: arm {cell.arm} keeps no policies, only curves and measurements")
-    return load_policies(outcomes.folder.policy_files(cell)[0])
+    return outcomes.folder.load_policies(cell)

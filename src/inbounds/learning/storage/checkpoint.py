@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from inbounds.learning.storage.whole_files import damaged, write_whole
+from inbounds.learning.storage.whole_files import damaged, says_nothing_of_the_file, write_whole
 
 FILE_NAME = "checkpoint.pt"
 
@@ -50,9 +50,9 @@ def load(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as parts:  # torch writes checksums and does not look at them
             bad = parts.testzip()
         state = _to_arrays(torch.load(path, weights_only=True))
-    except (PermissionError, MemoryError):  # the file may be sound
-        raise
     except Exception as error:  # torch raises whatever the damage makes it stumble over
+        if says_nothing_of_the_file(error):
+            raise
         raise damaged(path, error, remedy) from error
     if bad is not None:
         raise damaged(path, f"the checksum of {bad} is wrong", remedy)

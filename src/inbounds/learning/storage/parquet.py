@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from inbounds.learning.storage.run_metadata import METADATA_KEY, parsed
-from inbounds.learning.storage.whole_files import damaged
+from inbounds.learning.storage.whole_files import damaged, says_nothing_of_the_file
 
 
 def parquet_bytes(table: pa.Table, metadata: str) -> Any:
@@ -45,8 +45,8 @@ def read_table(path: str | Path, remedy: str = "") -> pa.Table:
         FileNotFoundError: there is no such file.
         DamagedFileError: it is damaged.
     """
-    with _damage_named(path, remedy):
-        return pq.read_table(path, page_checksum_verification=True)
+    with _damage_named(path, remedy), pq.ParquetFile(path, page_checksum_verification=True) as file:
+        return file.read()
 
 
 def read_about(path: str | Path, remedy: str = "", keys: Collection[str] = ()) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def about_of(schema: pa.Schema) -> dict[str, Any]:
 def _damage_named(path: str | Path, remedy: str) -> Iterator[None]:
     try:
         yield
-    except (FileNotFoundError, PermissionError):  # what is there may be sound
-        raise
     except (pa.ArrowException, OSError, ValueError) as error:
+        if says_nothing_of_the_file(error):
+            raise
         raise damaged(Path(path), error, remedy) from error

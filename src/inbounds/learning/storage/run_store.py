@@ -25,7 +25,7 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_table
 from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of, parsed
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
-from inbounds.learning.storage.whole_files import damaged, find, write_whole
+from inbounds.learning.storage.whole_files import damaged, find, says_nothing_of_the_file, write_whole
 
 CHECKPOINT_FILE = checkpoint.FILE_NAME
 CURVES_FILE = "curves.parquet"
@@ -178,11 +178,12 @@ def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = 
     write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
 
 
-def load_policies(run: str | Path) -> list[TrainedPolicy]:
+def load_policies(run: str | Path, remedy: str = "") -> list[TrainedPolicy]:
     """Load the policies of all seeds of a run.
 
     Args:
         run: run directory, or the safetensors file itself.
+        remedy: what to do about a damaged file; by default, to repeat the training.
 
     Raises:
         FileNotFoundError: there are none.
@@ -203,12 +204,12 @@ def load_policies(run: str | Path) -> list[TrainedPolicy]:
         with safetensors.safe_open(path, "np") as file:
             metadata = parsed((file.metadata() or {}).get(METADATA_KEY))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no dictionary)
-    except PermissionError:  # the file may be sound
-        raise
     except (safetensors.SafetensorError, OSError, ValueError) as error:
-        raise damaged(path, error) from error
+        if says_nothing_of_the_file(error):
+            raise
+        raise damaged(path, error, remedy) from error
     if metadata.get("sha256") != _digest(tensors):
-        raise damaged(path, "its checksum is wrong")
+        raise damaged(path, "its checksum is wrong", remedy)
     return policies_from(config_from(metadata), tensors)
 
 

@@ -36,6 +36,18 @@ def is_disk_full(error: BaseException | None) -> bool:
     return False
 
 
+def says_nothing_of_the_file(error: BaseException) -> bool:
+    """Tell whether reading failed before the contents were looked at: no file, no permission, no memory, no handle.
+
+    What is there may be sound. An error of the system has a number; what a reader says of contents has none.
+
+    Example:
+        >>> [says_nothing_of_the_file(e) for e in (PermissionError(errno.EACCES, "no"), OSError("no footer"))]
+        [True, False]
+    """
+    return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno is not None)
+
+
 def find(run: str | Path, name: str) -> Path:
     """Return the path of a file of a run.
 

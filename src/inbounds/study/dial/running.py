@@ -7,8 +7,10 @@ results/dial/checksums.txt  its SHA-256, as `sha256sum --check` reads it
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import shlex
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,12 +19,11 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from inbounds.learning import Trainer, train
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_about, read_table
 from inbounds.learning.storage.stored_config import changed_fields, describe
-from inbounds.learning.storage.whole_files import DamagedFileError, damaged, held, write_whole
+from inbounds.learning.storage.whole_files import damaged, held, write_whole
 from inbounds.study.dial.cells import DialCell, dial_cells
 from inbounds.study.dial.task import DialEnv
 from inbounds.study.running.provenance import provenance
@@ -55,6 +56,11 @@ class DialFolder:
         """The file of all cells."""
         return self.results / "map.parquet"
 
+    @property
+    def sum_file(self) -> Path:
+        """The checksum of the map."""
+        return self.results / "checksums.txt"
+
     def cell_file(self, cell: DialCell) -> Path:
         """Return the path of a finished cell's rows."""
         return self.work / f"{cell.id}.parquet"
@@ -83,12 +89,12 @@ class DialFolder:
         """
         if not self.map_file.is_file():
             raise FileNotFoundError(f"there is no {self.map_file}: make it (inbounds study dial run)")
-        line = (self.results / "checksums.txt").read_text()
+        folder = shlex.quote(str(self.results))
+        remedy = f"restore both (git checkout -- {folder}), or make them again (inbounds study dial run)"
+        line = self.sum_file.read_text() if self.sum_file.is_file() else ""
         if line.split()[:1] != [hashlib.sha256(self.map_file.read_bytes()).hexdigest()]:
-            raise DamagedFileError(
-                f"{self.map_file} is damaged: restore it (git checkout -- {self.map_file})"
-            )
-        return pq.read_table(self.map_file)
+            raise damaged(self.map_file, f"it is not the file that {self.sum_file} lists", remedy)
+        return read_table(self.map_file, remedy)
 
 
 def plain(cell: DialCell) -> dict[str, Any]:
@@ -153,7 +159,13 @@ def run_cells(
         BlockingIOError: another process runs in the folder.
     """
     folder.work.mkdir(parents=True, exist_ok=True)
-    with held(folder.work):
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(held(folder.work))
+        except BlockingIOError as error:
+            raise BlockingIOError(
+                f"another process runs in {folder.work}: wait until it is done, or choose another --work"
+            ) from error
         for i, cell in enumerate(cells, 1):
             if folder.finished(cell):
                 report(f"{i}/{len(cells)} {cell.id}: finished before")
@@ -187,7 +199,7 @@ def pack(folder: DialFolder) -> bool:
     data = parquet_bytes(pa.concat_tables(tables), json.dumps(of_the_map))
     folder.results.mkdir(parents=True, exist_ok=True)
     digest = hashlib.sha256(data).hexdigest()
-    write_whole(folder.results / "checksums.txt", f"{digest}  {folder.map_file.name}\n".encode())
+    write_whole(folder.sum_file, f"{digest}  {folder.map_file.name}\n".encode())
     write_whole(folder.map_file, data)
     return True
 

@@ -18,7 +18,7 @@ from inbounds.study.running.play_ways import play_cell
 from inbounds.study.running.provenance import provenance
 from inbounds.study.running.verify import TOLERANCE, Checked, same_arithmetic
 from inbounds.study.store import StudyFolder
-from inbounds.study.ways_played import evaluated, evaluation_file, schema, wrong_ways
+from inbounds.study.ways_played import evaluated, evaluation_file, read_ways, schema
 
 _REPLAYED = ("median-snapped",)  # falls early: the cheapest, and its actions are the median's
 
@@ -55,17 +55,10 @@ def check_ways(
 
 def wrong_evaluation(cell: Cell, folder: StudyFolder) -> str:
     """Return what is wrong with a cell's evaluation, the first thing; empty where nothing is."""
-    path, policies = evaluation_file(folder, cell), folder.policy_files(cell)[0]
-    if not policies.is_file():
-        return f"{policies} is missing: {store.restore(policies)}"
     try:
-        metadata, table = store.read_metadata(path), store.read_cell(path)
+        read_ways(folder, cell)
     except DamagedFileError as error:
         return str(error)
-    if said := wrong_ways(cell, table):
-        return f"{path}: {said}: {store.restore(path)}"
-    if not store.is_of(cell, metadata) or metadata.get("policies") != store.sha256(policies):
-        return f"{path} is of other policies than {policies}: delete it and run inbounds study evaluate"
     return ""
 
 

@@ -95,8 +95,9 @@ def _is_finished(cell: Cell, folder: StudyFolder) -> bool:
     """Return whether nothing is left to do, and raise where something is in the way."""
     state, path = folder.state(cell), folder.cell_file(cell)
     if state == "damaged":
+        first = folder.damaged_files(cell)[0]
         raise StudyError(
-            f"{path}, or a file or checksum that goes with it, is damaged: {store.restore(path)}"
+            f"{first}, or its line in {store.CHECKSUMS_FILE}, is damaged: {store.restore(first)}"
         )
     if state == "another configuration":
         raise StudyError(

@@ -172,7 +172,7 @@ def publish_records(cells: Sequence[Cell], folder: StudyFolder) -> bool:
     path = records_file(folder)
     kept, policies = [], {}
     if path.is_file():
-        kept, policies = store.read_cell(path).to_pylist(), store.read_metadata(path)["policies"]
+        kept, policies = store.read_cell(path).to_pylist(), store.read_metadata(path, "policies")["policies"]
     new = [cell for cell in mine if policies.get(cell.id) != store.sha256(folder.policy_files(cell)[0])]
     if not new:
         return False

@@ -17,7 +17,7 @@ import safetensors.numpy
 import torch
 from numpy.typing import NDArray
 
-from inbounds.learning import Trainer, load_policies
+from inbounds.learning import Trainer
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.study import store
 from inbounds.study.grid import ROBOTS, STUDY_VERSION, Cell
@@ -32,6 +32,7 @@ from inbounds.study.ways_played import (
     evaluation_file,
     nothing_file,
     nothing_schema,
+    other_policies,
     schema,
     summary,
     ways_of,
@@ -113,9 +114,8 @@ def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
         FileNotFoundError: they are not there.
         DamagedFileError: their file is damaged.
     """
-    path = folder.policy_files(cell)[0]
-    load_policies(path)  # looks at its checksum
-    tensors = safetensors.numpy.load_file(path)
+    folder.load_policies(cell)  # looks at the checksum
+    tensors = safetensors.numpy.load_file(folder.policy_files(cell)[0])
     trainer = Trainer(cell.kept_config)
     with torch.no_grad():
         for i, layer in enumerate(trainer.networks.actor.layers):
@@ -155,7 +155,8 @@ def evaluate_cells(
 ) -> list[Cell]:
     """Play the policies of every cell that has shipped them and has not been played, and write what they earn.
 
-    A cell's file is written whole, after its checksum: the same command goes on where it stopped.
+    A cell's file is written whole, after its checksum: the same command goes on where it stopped. An evaluation of
+    other policies, as of a cell that has been run again since, is replaced.
 
     Args:
         cells: to choose from.
@@ -164,6 +165,9 @@ def evaluate_cells(
 
     Returns:
         The cells that have been played now.
+
+    Raises:
+        DamagedFileError: a file of policies, or of what they earned, is damaged.
     """
     shipped = [
         c for c in cells if c.keeps_policies and all(path.is_file() for path in folder.policy_files(c))
@@ -174,7 +178,7 @@ def evaluate_cells(
     played = []
     for i, cell in enumerate(shipped):
         path = evaluation_file(folder, cell)
-        if path.is_file():
+        if path.is_file() and not other_policies(folder, cell):
             continue
         table = pa.Table.from_pylist(play_cell(cell, folder), schema())
         policies = store.sha256(folder.policy_files(cell)[0])
