@@ -1,11 +1,13 @@
 """The README is short, its findings are the data's, its snippet runs, its picture and its links are there."""
 
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from inbounds.book.report import study_pages, ways_to_act
+from inbounds.book.report import answers, study_pages, ways_to_act
+from inbounds.book.report.equal_start import grade, laws, outcomes_of_both
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast, change, differences
 from inbounds.study.outcomes import Outcomes
@@ -54,9 +56,12 @@ def test_a_beta(outcomes: Outcomes) -> None:
     assert (told.count("higher"), told.count("lower"), len(told)) == (4, 0, 6)
     said = bullet("try a Beta")
     assert "on 4 of 6 robots and below it on none" in said
-    humanoid = outcomes.finished["afterwards-humanoid-ppo-gaussian-matched-noise"]
-    assert f"leads by {lead(outcomes, 'Humanoid')}, where" in said
-    assert f"by {spoken(change(outcomes, humanoid, 'final'), 0)}." in said
+    quiet = answers.of(laws(outcomes_of_both(outcomes)), law="beta", algorithm="ppo", endpoint="final")
+    assert all(row.study == 2 for row in quiet)
+    grades = Counter(grade(row) for row in quiet if answers.sign(row) > 0)
+    assert grades == {"found with fresh seeds": 1, "suggested": 1}
+    assert "fresh seeds and a Gaussian whose σ is free, above on 2 of 6 (found on 1, suggested on 1)" in said
+    assert -1 not in map(answers.sign, quiet)
 
 
 def test_the_median() -> None:

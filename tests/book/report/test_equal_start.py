@@ -62,10 +62,12 @@ def test_grades_of_the_second_study(changed: dict, word: str) -> None:
 def test_what_is_too_small_to_matter_is_not_called_no_difference() -> None:
     small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
     assert answers.counted([SECOND_ONE, small]) == (
-        "above on 1 of 2 robots, below on 0, too small to matter on 1, no difference found on 0"
+        "above on 1 of 2 robots (found with fresh seeds), below on 0, too small to matter on 1, "
+        "no difference found on 0"
     )
     assert winners.field([small]) == "too small to matter, with fresh seeds; logit-normal not run"
-    assert "too small to matter" in answers.graded([small])
+    weak = dataclasses.replace(SECOND_ONE, whole=False)
+    assert answers.in_brackets([weak, SECOND_ONE, small]) == " (found with fresh seeds on 1, suggested on 1)"
 
 
 @pytest.fixture

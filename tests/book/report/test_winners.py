@@ -76,10 +76,10 @@ def test_the_finding_follows_the_rows() -> None:
     said = winners.finding(winners.by_test(["higher", "lower", ""]), rows, "beta", "ppo")
     assert said == (
         "Under PPO the Beta ends above the clipped Gaussian on 1 of 3 robots, and below it on 1 (found). "
-        "When both start equally quiet, the Beta ends above on 1 of 2 robots, below on none (found on 1)."
+        "When both start equally quiet, the Beta ends above on 1 of 2 robots (found) and below on none."
     )
     fresh = [dataclasses.replace(each, study=2) for each in rows]
-    free = "both start equally quiet, and the Gaussian has a free σ, the Beta"
+    free = "a Gaussian whose σ is free, both start equally quiet: there the Beta"
     assert free in winners.finding("x", fresh, "beta", "ppo")
     assert free not in winners.finding("x", [rows[0], fresh[1]], "beta", "ppo")
     assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("quiet")[2]

@@ -19,6 +19,8 @@ from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
 
+NAMES = {"beta": "Beta", "logit-normal": "logit-normal"}
+
 
 def sign(row: Evidence) -> int:
     """Return 1 where the difference is above 0, however well that is founded, −1 below, 0 where neither is shown."""
@@ -71,7 +73,7 @@ def advice(algorithm: str, law: str) -> str:
 
 
 def counted(rows: Sequence[Evidence]) -> str:
-    """Return on how many robots the differences lie where, in the book's words; says so where there are none.
+    """Return on how many robots the differences lie where, and how well founded; says so where there are none.
 
     Example:
         >>> counted([])
@@ -79,12 +81,13 @@ def counted(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    counts, small = Counter(map(sign, rows)), sum(map(too_small, rows))
+    above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
+    small = sum(map(too_small, rows))
     robots = f"{len(rows)} robot{'' if len(rows) == 1 else 's'}"
     refuted = f", too small to matter on {small}" if small else ""
     return (
-        f"above on {counts[1]} of {robots}, below on {counts[-1]}{refuted}, "
-        f"no difference found on {counts[0] - small}"
+        f"above on {len(above)} of {robots}{in_brackets(above)}, below on {len(below)}{in_brackets(below)}{refuted}, "
+        f"no difference found on {len(rows) - len(above) - len(below) - small}"
     )
 
 
@@ -98,17 +101,21 @@ def short(rows: Sequence[Evidence]) -> str:
     return counted(rows).partition(", no difference")[0]
 
 
-def graded(rows: Sequence[Evidence]) -> str:
-    """Return how well the differences are founded that are found or suggested, or refuted; the best grade first.
+def in_brackets(rows: Sequence[Evidence]) -> str:
+    """Return how well differences are founded that leave out 0, in brackets, the best grade first; empty for none.
 
     Example:
-        >>> graded([])
-        'no difference found'
+        >>> import numpy as np
+        >>> from inbounds.study.statistics import Estimate
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
+        >>> in_brackets([Evidence("Ant", "ppo", "beta", "final", ahead, study=1)])
+        ' (suggested)'
     """
-    order = ("found with fresh seeds", "found", "suggested", "too small to matter, with fresh seeds")
     counts = Counter[str](map(grade, rows))
-    known = [f"{word} on {counts[word]}" for word in order if counts[word]]
-    return "; ".join(known) or "no difference found"
+    known = [word for word in ("found with fresh seeds", "found", "suggested") if counts[word]]
+    if len(known) > 1:
+        known = [f"{word} on {counts[word]}" for word in known]
+    return f" ({', '.join(known)})" if known else ""
 
 
 def leading(rows: Sequence[Evidence]) -> str:
@@ -211,8 +218,9 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
         said.append(
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
-    if lent := sorted({f"{row.robot} ({row.algorithm.upper()})" for row in rows if row.as_it_comes}):
-        said.append(f"The bounded law has its usual start, nearly as quiet: {', '.join(lent)}.")
+    lent = [row for row in rows if row.as_it_comes]
+    if names := sorted({f"{row.robot}, {NAMES[row.law]} ({row.algorithm.upper()})" for row in lent}):
+        said.append(f"With its usual start, somewhat louder than 0.4: {'; '.join(names)}.")
     return " ".join(said)
 
 

@@ -18,13 +18,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from inbounds.book.drawing.figures import LOOKS, WIDTH
+from inbounds.book.report.equal_start import clear
 from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate, difference
 
 BOUNDED: Mapping[str, str] = {"beta": "Beta", "logit-normal": "logit-normal"}
 """Families with three centres, and their names within a label."""
-NAMES: Mapping[str, str] = {"gaussian": "Gaussian", "clipped-gaussian": "clipped Gaussian", **BOUNDED}
+NAMES: Mapping[str, str] = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", **BOUNDED}
 """All families, likewise."""
 WAYS: Mapping[str, str] = {"mean": "mean", "mode": "mode", "sample": "noise kept"}
 """What is compared with the median, and its panel's title."""
@@ -50,15 +51,14 @@ class Row:
     """By way to act (`WAYS`): the return less the median's, a mean over seeds, in % of the median's return."""
 
     def found(self, way: str) -> int:
-        """Return the sign of the difference, 0 where its 95 % interval holds zero.
+        """Return the sign of the difference, 0 where its 95 % interval holds zero (`equal_start.clear`).
 
         Example:
             >>> gain = Estimate(-3.0, -5.0, -1.0, 10, 0, 0.95, "difference of means")
             >>> Row("Ant", "PPO, Beta", "beta", {"mode": gain}).found("mode")
             -1
         """
-        gain = self.gains[way]
-        return int(gain.low > 0) - int(gain.high < 0)
+        return clear(self.gains[way])
 
 
 def rows_of(outcomes: Outcomes) -> list[Row]:

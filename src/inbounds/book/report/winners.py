@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import graded, of, place_of, sign
+from inbounds.book.report.answers import NAMES, in_brackets, of, place_of, sign, too_small
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.study.grid import ROBOTS
 
 ALGORITHMS = ("ppo", "trpo")
-NAMES = {"beta": "Beta", "logit-normal": "logit-normal"}
 EVIDENCE = "what_happened.html"
 """The page that has a row of intervals for every field."""
 
@@ -95,11 +94,19 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     first = f"Under {algorithm.upper()} the {name} ends {as_they_come}."
     if not here:
         return f"{first} From an equally quiet start the two were not compared yet."
-    signs = [sign(row) for row in here]
-    grades = f" ({graded(here)})" if any(signs) else ""
-    above, below = _of(signs.count(1), len(here)), _none(signs.count(-1))
-    free = ", and the Gaussian has a free σ" if all(row.study == 2 for row in here) else ""
-    return f"{first} When both start equally quiet{free}, the {name} ends above on {above}, below on {below}{grades}."
+    above, below = ([row for row in here if sign(row) == way] for way in (1, -1))
+    told = (
+        f"the {name} ends above on {_of(len(above), len(here))}{in_brackets(above)} "
+        f"and below on {_none(len(below))}{in_brackets(below)}"
+    )
+    if small := sum(map(too_small, here)):
+        told += f"; on {small} the difference is too small to matter"
+    if all(row.study == 2 for row in here):
+        return (
+            f"{first} In a second study, with fresh seeds and a Gaussian whose σ is free, both start equally quiet: "
+            f"there {told}."
+        )
+    return f"{first} When both start equally quiet, {told}."
 
 
 def by_test(words: Sequence[str]) -> str:
