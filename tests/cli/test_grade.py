@@ -1,6 +1,11 @@
 """`inbounds grade`: what graders say of students' notebooks, each run in a process of its own, within its limits."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import nbformat
@@ -84,11 +89,72 @@ def test_files_that_are_no_such_notebook(tmp_path: Path) -> None:
     assert "calls no grader" in graded(other)[0][2]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "said", ["caf\x85e", "one\u2028two", "a\udc80b"], ids=["next line", "separator", "surrogate"]
+)
+def test_a_students_words_do_no_harm(tmp_path: Path, said: str) -> None:
+    raises = f"def bits_for(z):\n    raise ValueError({said!r})"
+    path = notebook(tmp_path / "a.ipynb", IMPORTS, raises, CALL, RIGHT, CALL)
+    (_, first, _), (_, second, _) = graded(path)
+    assert (first, second) == ("not yet", "passed")
+
+
+def test_a_file_that_cannot_be_read_is_one_students(tmp_path: Path) -> None:
+    (tmp_path / "a.ipynb").symlink_to("/nowhere")
+    ((_, mark, why),) = graded(tmp_path / "a.ipynb")
+    assert (mark, why[:29]) == ("not reached", "this file cannot be read (No ")
+
+
+@pytest.mark.parametrize("signal_sent", [signal.SIGINT, signal.SIGTERM])
+def test_what_was_graded_before_an_interruption_is_kept(
+    signal_sent: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in "abc":
+        notebook(tmp_path / f"{name}.ipynb", CALL)
+    out = tmp_path / "grades.csv"
+    out.write_text("of last week", encoding="utf8")
+
+    def grade(path: Path, *_: float) -> list[grading.Grade]:
+        if path.stem == "b":
+            signal.raise_signal(signal_sent)
+        return [grading.Grade(path, "bits_for", "passed", "")]
+
+    monkeypatch.setattr(grading, "grade", grade)
+    before = signal.getsignal(signal.SIGTERM)
+    code, said, _ = run("grade", tmp_path, "--out", out)
+    assert code == 130
+    assert "1 of 1 exercises passed" in said
+    assert out.read_text(encoding="utf8") == "of last week"
+    assert len((tmp_path / "grades.partial.csv").read_text(encoding="utf8").splitlines()) == 2
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.slow
+def test_the_end_of_grading_is_the_end_of_the_students_process(tmp_path: Path) -> None:
+    mark = tmp_path / "pid"
+    cell = f"import os\nopen({str(mark)!r}, 'w').write(str(os.getpid()))\ntime.sleep(600)"
+    path = notebook(tmp_path / "a.ipynb", IMPORTS, cell, RIGHT, CALL)
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"from inbounds.cli import main; main(['grade', {str(path)!r}])"]
+    )
+    while not mark.exists() or not mark.read_text(encoding="utf8"):
+        assert process.poll() is None
+        time.sleep(0.1)
+    process.terminate()
+    process.wait(30)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(mark.read_text(encoding="utf8")), 0)
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [
         (["nowhere"], "there is no nowhere: name a notebook, or a folder of notebooks"),
         ([".", "--seconds", "0"], "--seconds and --gigabytes must be positive numbers"),
+        ([".", "--seconds", "nan"], "--seconds and --gigabytes must be positive numbers"),
+        ([".", "--gigabytes", "inf"], "--seconds and --gigabytes must be positive numbers"),
+        ([".", "--out", "."], ". cannot be written: choose another --out"),
         ([".", "--out", "no/folder/a.csv"], "there is no folder no/folder for the CSV"),
         (["."], "has no notebook in it"),
     ],

@@ -356,6 +356,16 @@ def test_tensorboard_shows_the_curves_once(tmp_path: Path) -> None:
     np.testing.assert_allclose([event.value for event in scalars], of_seed["kl"].to_numpy(), rtol=1e-6)
 
 
+def test_tensorboard_without_a_place_for_its_files(tmp_path: Path) -> None:
+    pytest.importorskip("tensorboard")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "tensorboard").touch()
+    code, _, err = run(*small(tmp_path / "run", 1, "Hopper-v5", "--tensorboard"))
+    assert code == 1
+    assert "cannot hold TensorBoard's files" in err
+    assert "choose another --out" in err
+
+
 def test_tensorboard_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "tensorboard", None)
     monkeypatch.delitem(sys.modules, "torch.utils.tensorboard", raising=False)

@@ -67,7 +67,10 @@ def test_what_has_no_simulation_is_trained_and_not_filmed(tmp_path: Path) -> Non
     assert "film it" not in out
     code, _, err = run("watch", tmp_path / "car", "--seconds", "0.1")
     assert code == 1
-    assert "gives no access to a MuJoCo simulation" in err
+    assert (
+        "Continuous_MountainCarEnv gives no access to a MuJoCo simulation: only MuJoCo's robots can be drawn"
+        in err
+    )
 
 
 @pytest.mark.parametrize(

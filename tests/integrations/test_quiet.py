@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import torch
+from gymnasium import spaces
+from gymnasium.wrappers import TransformAction
 from sb3_contrib import TRPO
 from scipy import integrate, stats
 from stable_baselines3 import A2C, PPO, SAC
@@ -14,7 +16,7 @@ from torchrl.modules import NormalParamExtractor
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.integrations.quiet import quiet_scale
 from inbounds.integrations.stable_baselines3 import LogitNormalPolicy, quiet_start
-from inbounds.integrations.torchrl import bounded_actor
+from inbounds.integrations.torchrl import bounded_actor, quiet_actor
 from inbounds.learning import executed_std
 from tests.integrations.tank import HIGH, LOW, Tank
 
@@ -56,6 +58,33 @@ def test_models_of_the_peer_start_so_in_a_lopsided_box(algorithm, policy) -> Non
         before = model.policy.log_std.clone()
     model.learn(256)
     assert not torch.equal(before, model.policy.log_std)  # still learned
+
+
+@pytest.mark.parametrize("half", [0.001, 1.0, 50.0])
+def test_the_size_of_the_box_does_not_matter(half: float) -> None:
+    """Over observations that are not zero, too: the spread of μ has the box's units."""
+    env = TransformAction(Tank(), lambda a: a, spaces.Box(-half, half, (2,)))
+    model = quiet_start(PPO("MlpPolicy", env, n_steps=128, device="cpu", seed=1), 0.4)
+    obs = np.random.default_rng(0).normal(size=(40_000, 2)).astype(np.float32)
+    actions, _ = model.predict(obs, deterministic=False)
+    assert (actions / half).std(0) == pytest.approx([0.4, 0.4], abs=0.01)
+
+
+def test_a_quiet_actor_reads_several_names_and_takes_the_bodys_dtype() -> None:
+    class Both(nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.layer = nn.Linear(5, 8, dtype=torch.float64)
+
+        def forward(self, place: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
+            return self.layer(torch.cat([place, speed], -1)).tanh()
+
+    for law in (LogitNormal, ScaledBeta):
+        _, acting = quiet_actor(Both(), 8, law, LOW, HIGH, in_keys=("place", "speed"))
+        seen = {"place": torch.zeros(4, 2).double(), "speed": torch.zeros(4, 3).double()}
+        batch = acting(TensorDict(seen, batch_size=[4]))
+        assert batch["action"].shape == (4, 2)
+        assert batch["latent_log_prob"].dtype == torch.float64
 
 
 def test_what_has_no_such_start_is_refused() -> None:

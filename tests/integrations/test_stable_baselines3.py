@@ -143,6 +143,33 @@ def test_an_impossible_box_is_refused_at_once(low: float, high: float, wrong: st
         LogitNormalDistribution(np.float32([-1.0, low]), np.float32([1.0, high]))
 
 
+class Unwell(Tank):
+    """A tank whose gauge breaks."""
+
+    def _obs(self) -> np.ndarray:
+        return super()._obs() if self.elapsed < 5 else np.float32([np.nan, 0.5])
+
+
+def test_what_is_not_finite_is_no_action() -> None:
+    model = PPO(LogitNormalPolicy, Unwell(), n_steps=64, device="cpu")
+    with pytest.raises(ValueError, match="gives NaN or ∞: look for an observation that is not finite"):
+        model.learn(64)
+    with pytest.raises(ValueError, match="gives NaN or ∞"):
+        model.predict(np.float32([np.nan, 0]))
+    with torch.no_grad():
+        model.policy.log_std.fill_(np.inf)
+    with pytest.raises(ValueError, match="gives NaN or ∞"):
+        model.predict(np.zeros(2, np.float32))
+
+
+def test_an_action_has_its_latent() -> None:
+    policy = PPO(LogitNormalPolicy, Tank(), n_steps=64, device="cpu").policy
+    latents = np.float32([[-3.0, 2.0], [0.0, 1.0]])
+    actions = policy.unscale_action(latents)
+    assert np.allclose(actions, LOW + (HIGH - LOW) / (1 + np.exp(-latents)), rtol=1e-6)
+    assert np.allclose(policy.scale_action(actions), latents, atol=1e-5)
+
+
 def test_its_noise_is_its_own() -> None:
     with pytest.raises(ValueError, match="leave use_sde=False"):
         PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")

@@ -178,6 +178,14 @@ def test_the_divergence_is_exact(law: type) -> None:
     assert torch.allclose(kl_divergence(Latents(p), Latents(q)), kl_divergence(p, q).sum(-1))
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_a_network_of_another_size_is_refused(law: type) -> None:
+    """It would be broadcast: one law for all components."""
+    _, acting = bounded_actor(network(law), law, [-1.0, -2.0, -3.0], [1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="parameters of 2 components, and the box has 3: it needs 6 outputs"):
+        acting(observations(4))
+
+
 def test_other_laws_are_refused() -> None:
     with pytest.raises(ValueError, match="LogitNormal and ScaledBeta"):
         bounded_actor(network(LogitNormal), ClippedNormal, LOW, HIGH)

@@ -1,3 +1,4 @@
+import copy
 import dataclasses
 import os
 import signal
@@ -148,11 +149,30 @@ def test_new_episodes_after_a_resumption_are_seen_with_the_old_statistics() -> N
     resumed = Trainer(run.config, forgetful)
     resumed.load_state_dict(run.state_dict())
     collector = resumed.collector
-    first, _ = forgetful(3).reset(seed=[stream.environment for stream in collector.streams])
+    seeds = [int(copy.deepcopy(s.noise).integers(2**31)) for s in run.collector.streams]
+    first, _ = forgetful(3).reset(seed=seeds)
     assert collector.normalizer.count == run.collector.normalizer.count + 1
     assert np.array_equal(collector.obs, collector.normalizer(first))
     # Fresh statistics would have seen nothing but these observations: all would be 0.
     assert np.abs(collector.obs).max() > 0.1
+
+
+def test_every_resumption_has_starts_of_its_own() -> None:
+    """A run that is often interrupted does not train on the same few starts again and again."""
+    run, seen = small_run(small_config(epochs=3), saves=False), []
+    run.collector.envs.reset = lambda *, seed, envs=run.collector.envs: (
+        seen.append(seed) or (PointEnv.reset(envs, seed=seed))
+    )
+    run.collector.restart()
+    state = run.state_dict()
+    run.load_state_dict(state)
+    run.load_state_dict(state)
+    run.epoch()
+    run.load_state_dict(run.state_dict())
+    begin, first, again, later = map(tuple, seen)
+    assert begin == tuple(stream.environment for stream in run.collector.streams)
+    assert first == again  # the state decides
+    assert len({*begin, *first, *later}) == 3 * len(begin)
 
 
 def test_new_episodes_after_a_resumption_begin_with_no_return() -> None:

@@ -73,6 +73,8 @@ def _run(args: list[str]) -> int:
     if args == ["--version"]:
         print(f"inbounds {inbounds.__version__}")
         return 0
+    if args == ["doctor"]:  # before all that may be missing
+        return _doctor()
     # Not at the top: torch takes seconds to import, during which Ctrl-C should find the handler above.
     from inbounds.cli import benchmark, options, training, watching
     from inbounds.headless import BackendError
@@ -90,9 +92,7 @@ def _run(args: list[str]) -> int:
         if isinstance(command, options.Watch):
             return watching.run(command)
         if isinstance(command, options.Doctor):
-            from inbounds.cli.classroom import doctor
-
-            return doctor.run()
+            return _doctor()
         if isinstance(command, options.Grade):
             from inbounds.cli.classroom import grading
 
@@ -119,3 +119,15 @@ def _run(args: list[str]) -> int:
             file=sys.stderr,
         )
         return 2
+
+
+def _doctor() -> int:
+    try:
+        from inbounds.cli.classroom import doctor
+    except ModuleNotFoundError as error:  # what it looks and prints with
+        package = (error.name or "").partition(".")[0]
+        print(
+            f"inbounds: the package {package} is missing: pip install . in the source tree", file=sys.stderr
+        )
+        return 1
+    return doctor.run()

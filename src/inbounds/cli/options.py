@@ -27,6 +27,8 @@ FamilyName: TypeAlias = Literal["gaussian", "clipped-gaussian", "beta", "logit-n
 AlgorithmName: TypeAlias = Literal["ppo", "trpo", "policy-gradient"]
 PresetName: TypeAlias = Literal["common", "as-printed"]
 Greedy: TypeAlias = Literal["mean", "median", "mode", "sample"]
+MOST_SEEDS = 10_000
+"""Of one run, which keeps all of them in memory."""
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
@@ -46,13 +48,18 @@ def parse_seeds(text: str) -> tuple[int, ...]:
         if "," in text:
             return tuple(int(part) for part in text.split(",") if part)
         if "-" in text:
-            first, last = text.split("-")
-            return tuple(range(int(first), int(last) + 1))
-        return tuple(range(int(text)))
+            first, last = map(int, text.split("-"))
+            if first > last:
+                raise ValueError
+        else:
+            first, last = 0, int(text) - 1
     except ValueError:
         raise ValueError(
             f"{text!r} names no seeds: give a number of seeds (10), some of them (0,7) or a range (10-19)"
         ) from None
+    if last - first >= MOST_SEEDS:
+        raise ValueError(f"{text!r} asks for {last - first + 1} seeds; one run holds at most {MOST_SEEDS}")
+    return tuple(range(first, last + 1))
 
 
 def format_seeds(seeds: Sequence[int]) -> str:

@@ -24,7 +24,7 @@ class TensorBoardWriter:
         seeds: of the run.
 
     Raises:
-        CommandError: TensorBoard is not installed.
+        CommandError: TensorBoard is not installed, or the directory cannot be made.
     """
 
     def __init__(self, directory: Path, seeds: tuple[int, ...]) -> None:
@@ -33,7 +33,13 @@ class TensorBoardWriter:
         except ImportError as error:
             raise CommandError("--tensorboard needs TensorBoard: pip install tensorboard") from error
         make: Any = SummaryWriter
-        self._writers = [make(str(directory / f"seed-{seed}"), purge_step=0) for seed in seeds]
+        try:
+            self._writers = [make(str(directory / f"seed-{seed}"), purge_step=0) for seed in seeds]
+        except OSError as error:
+            raise CommandError(
+                f"{directory} cannot hold TensorBoard's files ({error.strerror or error}): "
+                "move it away, or choose another --out"
+            ) from error
         self._written = 0
 
     def __enter__(self) -> Self:

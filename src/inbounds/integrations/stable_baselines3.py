@@ -64,7 +64,16 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         self.low, self.high = require_bounds(low, high)
 
     def proba_distribution(self, mean_actions: Tensor, log_std: Tensor) -> LogitNormalDistribution:
-        """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them."""
+        """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them.
+
+        Raises:
+            ValueError: they are not finite.
+        """
+        if not bool(torch.isfinite(mean_actions).all() and torch.isfinite(log_std).all()):
+            raise ValueError(
+                "the policy network gives NaN or ∞: look for an observation that is not finite, "
+                "or take a smaller learning rate"
+            )
         low, high = (bound.to(mean_actions) for bound in (self.low, self.high))
         self.distribution = LogitNormal(mean_actions, log_std.exp(), low, high, validate_args=False)
         return self
@@ -133,9 +142,17 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
         latent = torch.as_tensor(scaled_action)
-        low, high = (torch.as_tensor(np.array(bound)).to(latent) for bound in self._bounds)
-        law = LogitNormal(latent, torch.ones_like(latent), low, high, validate_args=False)
+        law = self._law(torch.zeros_like(latent))
         return law.latent_to_value(latent).numpy().astype(self.action_space.dtype)
+
+    def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
+        """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
+        value = torch.as_tensor(action)
+        return self._law(torch.zeros_like(value)).value_to_latent(value).numpy()
+
+    def _law(self, loc: Tensor) -> LogitNormal:
+        low, high = (torch.as_tensor(np.array(bound)).to(loc) for bound in self._bounds)
+        return LogitNormal(loc, torch.ones_like(loc), low, high, validate_args=False)
 
     @property
     def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -146,8 +163,10 @@ class LogitNormalPolicy(ActorCriticPolicy):
 def quiet_start(model: Any, std: float = 0.4) -> Any:
     """Centre an untrained policy in its box and give its actions the standard deviation std; call it before `learn`.
 
-    The peer starts with log σ = 0, in the box's units for its own Gaussian, whatever the box. What is set here is the
-    free log σ and the bias of the head of μ, nothing else; both are learned from there.
+    The peer starts with log σ = 0 and a spread of μ of about 0.01, both in the box's units for its own Gaussian,
+    whatever the box. Here the free log σ is set, and the bias of the head of μ; the weights of the Gaussian's head
+    are scaled by half the range. All are learned from there. Without the peer's `ortho_init` μ spreads more, and so do
+    the actions.
 
     Args:
         model: PPO, A2C or TRPO with the peer's own Gaussian or with `LogitNormalPolicy`, on a bounded box.
@@ -180,4 +199,5 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         else:
             policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())
             policy.action_net.bias.copy_((high + low) / 2)
+            policy.action_net.weight.mul_(((high - low) / 2)[:, None])
     return model

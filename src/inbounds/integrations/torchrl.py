@@ -132,7 +132,8 @@ def bounded_actor(
         `set_exploration_type` says otherwise (TorchRL's own actors act without noise then).
 
     Raises:
-        ValueError: another law, or bounds that are not finite, not in order, or too close for a number between them.
+        ValueError: another law, or bounds that are not finite, not in order, or too close for a number between them;
+            when it acts, a network with another number of outputs.
 
     Example:
         >>> from tensordict import TensorDict
@@ -165,6 +166,13 @@ def bounded_actor(
 
 
 def _latents(law: type[LogitNormal | ScaledBeta], low: Tensor, high: Tensor, **parameters: Tensor) -> Latents:
+    first = next(iter(parameters.values()))
+    if low.dim() and first.shape[-1:] != low.shape[-1:]:  # would be broadcast: one law for all components
+        raise ValueError(
+            f"the network gives parameters of {first.shape[-1]} components, and the box has {low.shape[-1]}: "
+            f"it needs {2 * low.shape[-1]} outputs"
+        )
+    low, high = low.to(first), high.to(first)
     return Latents(law(**parameters, low=low, high=high, validate_args=False))
 
 
@@ -186,6 +194,17 @@ class _BetaHead(nn.Module):
         return tuple((1 + nn.functional.softplus(outputs + self.shift)).chunk(2, dim=-1))
 
 
+class _Headed(nn.Module):
+    """A body of any number of inputs, a last layer, and a head."""
+
+    def __init__(self, body: nn.Module, last: nn.Module, head: nn.Module) -> None:
+        super().__init__()
+        self.body, self.last, self.head = body, last, head
+
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, ...]:
+        return self.head(self.last(self.body(*inputs)))
+
+
 def quiet_actor(
     body: nn.Module,
     features: int,
@@ -201,7 +220,7 @@ def quiet_actor(
     it below `set_exploration_type(ExplorationType.DETERMINISTIC)`: the median of a logit-normal, the mean of a Beta.
 
     Args:
-        body: from what is under `in_keys` to features `[..., F]`.
+        body: from what is under `in_keys` to features `[..., F]`; the last layer gets its device and dtype.
         features: F.
         law: `LogitNormal` or `ScaledBeta`.
         low: `[A]` lower bounds of the action, in its own units.
@@ -241,7 +260,9 @@ def quiet_actor(
                 f"std={std} is out of reach: TorchRL's biased_softplus keeps σ above {LEAST_SCALE}"
             )
         head = NormalParamExtractor(scale_mapping=f"biased_softplus_{scale}")
-    last = nn.Linear(features, 2 * require_bounds(low, high)[0].numel())
+    like = next(body.parameters(), torch.empty(0))
+    outputs = 2 * require_bounds(low, high)[0].numel()
+    last = nn.Linear(features, outputs, device=like.device, dtype=like.dtype)
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.zeros_(last.bias)
-    return bounded_actor(nn.Sequential(body, last, head), law, low, high, in_keys)
+    return bounded_actor(_Headed(body, last, head), law, low, high, in_keys)

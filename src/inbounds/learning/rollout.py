@@ -140,11 +140,15 @@ class Collector:
         self.returns = np.zeros(len(streams))  # of the episodes under way
         self.restart()
 
-    def restart(self) -> None:
-        """Start new episodes everywhere, from each seed's own environment seed."""
+    def restart(self, seeds: Sequence[int] | None = None) -> None:
+        """Start new episodes everywhere.
+
+        Args:
+            seeds: `[S]` of the environments; None takes each seed's own, with which a run begins.
+        """
         # Any: VectorEnv declares an integer, every vector environment takes a list.
-        seeds: Any = [stream.environment for stream in self.streams]
-        obs, _ = self.envs.reset(seed=seeds)
+        chosen: Any = [stream.environment for stream in self.streams] if seeds is None else list(seeds)
+        obs, _ = self.envs.reset(seed=chosen)
         self.obs = self._see(obs)
         self.returns[:] = 0
 
@@ -263,7 +267,7 @@ class Collector:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to a state. Environments without `set_state` start new episodes instead.
+        """Go back to a state. Environments without `set_state` start new episodes instead, not those of the beginning.
 
         Raises:
             ValueError: the environment's actions have other bounds than they had.
@@ -277,7 +281,8 @@ class Collector:
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
         if state["envs"] is None:
-            self.restart()  # its first observations are seen with the statistics that have just been loaded
+            # New starts, decided by the state; their observations are seen with the statistics that have been loaded.
+            self.restart([int(stream.noise.integers(2**31)) for stream in self.streams])
         else:
             envs: Any = self.envs if hasattr(self.envs, "set_state") else self.envs.unwrapped
             envs.set_state(state["envs"])

@@ -248,8 +248,8 @@ def _simulation(env: Any, index: int) -> tuple[mujoco.MjModel, Callable[[int], m
     singles = [single.unwrapped for single in getattr(inner, "envs", [inner])]  # SyncVectorEnv has several
     if not all(isinstance(getattr(single, "model", None), mujoco.MjModel) for single in singles):
         raise TypeError(
-            f"{type(inner).__name__} gives no access to a MuJoCo simulation: use gymnasium.make(...), "
-            "SyncVectorEnv or inbounds.robots.make(...)"
+            f"{type(singles[0]).__name__} gives no access to a MuJoCo simulation: only MuJoCo's robots can be drawn, "
+            "made by gymnasium.make(...), SyncVectorEnv or inbounds.robots.make(...)"
         )
     return singles[index].model, lambda i: singles[i].data
 

@@ -149,7 +149,7 @@ def test_the_forest_says_what_is_there_and_what_is_not(folder: StudyFolder) -> N
     rows = laws(outcomes_of_both(Outcomes.read(folder)))
     shown = answers.by_algorithm(rows).html
     assert "Beta − Gaussian" in shown
-    assert "The bounded law has its usual start, nearly as quiet: Ant (PPO)." in shown
+    assert "With its usual start, somewhat louder than 0.4: Ant, Beta (PPO)." in shown
     assert "Not run from an equal start." in shown
     assert "Ant (Logit-normal)" in shown
     assert "missing" in answers.by_algorithm([]).html

@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_about, read_table
+from inbounds.learning.storage.run_metadata import METADATA_KEY
 from inbounds.learning.storage.run_store import config_of
 from inbounds.learning.storage.whole_files import DamagedFileError
 
@@ -45,6 +46,28 @@ def test_a_flipped_bit_a_lost_end_and_a_foreign_table_are_told_with_the_remedy(p
         read_about(path, "make it again")
     with pytest.raises(ValueError, match="inbounds did not write it"):
         config_of(read_table(path))
+
+
+def test_another_word_about_itself_is_damage(path: Path) -> None:
+    table = pq.read_table(path)
+    about = table.schema.metadata | {METADATA_KEY.encode(): json.dumps(ABOUT | {"id": "mine"}).encode()}
+    pq.write_table(table.replace_schema_metadata(about), path)
+    for read in (read_table, read_about):
+        with pytest.raises(DamagedFileError, match="of its columns and of what it says of itself"):
+            read(path)
+
+
+def test_another_name_of_a_column_is_damage(path: Path) -> None:
+    table = pq.read_table(path)
+    pq.write_table(table.rename_columns(["y"]).replace_schema_metadata(table.schema.metadata), path)
+    with pytest.raises(DamagedFileError, match="of its columns"):
+        read_table(path)
+
+
+def test_an_older_table_without_that_checksum_is_read(path: Path) -> None:
+    pq.write_table(TABLE.replace_schema_metadata({METADATA_KEY: json.dumps(ABOUT)}), path)
+    assert read_about(path) == ABOUT
+    assert read_table(path).equals(TABLE)
 
 
 def test_a_table_of_ours_that_is_no_runs_has_no_configuration(path: Path) -> None:

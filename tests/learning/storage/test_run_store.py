@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import safetensors
+import safetensors.numpy
 import torch
 from safetensors.numpy import load_file
 from scipy import stats
@@ -24,6 +25,7 @@ from inbounds.learning.storage.run_store import (
     load_policy,
     policies_of,
     read_curves,
+    save_policies,
     save_run,
 )
 from inbounds.learning.storage.trained_policy import TrainedPolicy
@@ -229,6 +231,22 @@ def test_what_is_asked_of_a_policy_wrongly(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="train a run first"):
         load_policy(tmp_path / "nowhere")
     assert repr(policy) == "<TrainedPolicy: gaussian, ppo, point, seed 0>"
+
+
+def test_another_configuration_in_the_policies_file_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "policies.safetensors"
+    save_policies(path, small_run(small_config(seeds=2)))
+    with safetensors.safe_open(path, "np") as file:
+        about = json.loads(file.metadata()[METADATA_KEY])
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    for name, value in {"seeds": [0, 9], "env": "point-v2"}.items():
+        changed = about | {"config": about["config"] | {name: value}}
+        safetensors.numpy.save_file(tensors, path, {METADATA_KEY: json.dumps(changed)})
+        with pytest.raises(DamagedFileError, match="its checksum is wrong"):
+            load_policies(path)
+    del changed["sha256_config"]  # as an older file
+    safetensors.numpy.save_file(tensors, path, {METADATA_KEY: json.dumps(changed)})
+    assert load_policies(path)[0].config.env == "point-v2"
 
 
 def test_files_of_another_origin(tmp_path: Path) -> None:

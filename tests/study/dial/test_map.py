@@ -55,7 +55,7 @@ def test_a_run_is_resumed_packed_and_read(folder: DialFolder) -> None:
     ):
         folder.read()
     folder.sum_file.unlink()
-    with pytest.raises(DamagedFileError, match=r"it is not the file that .*checksums\.txt lists"):
+    with pytest.raises(DamagedFileError, match=r"checksums\.txt does not list it"):
         folder.read()
     assert run_cells(SMALL, folder)  # mends it
     assert folder.read().equals(table)
@@ -70,6 +70,15 @@ def test_two_runs_in_one_folder_are_refused_in_words(folder: DialFolder) -> None
         str(found)
         == f"another process runs in {folder.work}: wait until it is done, or choose another --work"
     )
+
+
+def test_an_impossible_folder_is_found_out_before_the_first_cell(
+    folder: DialFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.results.touch()
+    monkeypatch.setattr(running, "run_cell", lambda cell: pytest.fail("it has begun"))
+    with pytest.raises(FileExistsError):
+        run_cells(SMALL[:1], folder)
 
 
 @pytest.mark.parametrize("key", ["seconds", "commit"])

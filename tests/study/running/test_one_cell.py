@@ -320,6 +320,15 @@ def test_the_damaged_companion_is_named_and_what_to_delete(tmp_path: Path) -> No
     assert run_cell(cell, folder) == "finished"  # what the message says helps
 
 
+def test_an_impossible_folder_is_found_out_before_the_first_epoch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "results").touch()
+    monkeypatch.setattr(one_cell, "MeasuredTrainer", lambda cell: pytest.fail("it has begun"))
+    with pytest.raises(OSError, match="results"):
+        run_cell(small_cell(), folder_in(tmp_path))
+
+
 def test_results_of_another_configuration_are_not_mixed_in(tmp_path: Path) -> None:
     folder = folder_in(tmp_path)
     run_cell(small_cell(epochs=10), folder)

@@ -148,7 +148,7 @@ def judge_diagnosis(
     """
     if any(answers.get(name, ...) is ... for name in broken):
         return Judgement("diagnosis", None, f"name a check for every {noun}, and run this cell again")
-    if unknown := [answer for answer in answers.values() if answer not in checks]:
+    if unknown := [answer for answer in answers.values() if answer not in list(checks)]:
         return Judgement(
             "diagnosis", False, f"no check is called {unknown[0]!r}; there are {', '.join(checks)}"
         )

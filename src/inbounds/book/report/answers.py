@@ -6,6 +6,7 @@ first_choice(of(rows, algorithm="ppo"))
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -92,13 +93,13 @@ def counted(rows: Sequence[Evidence]) -> str:
 
 
 def short(rows: Sequence[Evidence]) -> str:
-    """Return `counted` without the robots on which no difference is found.
+    """Return `counted` without how well each is founded, and without the robots on which no difference is found.
 
     Example:
         >>> short([])
         'not run yet'
     """
-    return counted(rows).partition(", no difference")[0]
+    return re.sub(r" \(.*?\)", "", counted(rows)).partition(", no difference")[0]
 
 
 def in_brackets(rows: Sequence[Evidence]) -> str:

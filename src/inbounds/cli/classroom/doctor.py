@@ -117,9 +117,10 @@ def look_at_drawing() -> Diagnosis:
         wrong = said[-1]
     from inbounds.headless import PACKAGES_HINT
 
-    return Diagnosis(
-        "drawing", "missing", wrong, f"{PACKAGES_HINT} (on Debian and Ubuntu): the book's films need it"
-    )
+    remedy = f"{PACKAGES_HINT} (on Debian and Ubuntu)"
+    if "MUJOCO_GL" in wrong:  # MuJoCo knows no such backend
+        remedy = "unset MUJOCO_GL, or set it to egl or osmesa"
+    return Diagnosis("drawing", "missing", wrong, f"{remedy}: the book's films need it")
 
 
 def look_at_films() -> Diagnosis:

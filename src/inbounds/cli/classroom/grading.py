@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import importlib.util
 import json
+import math
 import os
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +23,9 @@ from rich.table import Table
 
 from inbounds.book.pages.graded import grader_shown
 from inbounds.cli.errors import CommandError
+
+MOST_GIGABYTES = 1e6
+"""More than any machine has, and few enough to count in bytes."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +64,13 @@ def graders_shown(notebook: Path) -> dict[int, str]:
     """Return the graders whose judgements a notebook shows, by the cell's number, in order.
 
     Raises:
-        ValueError: the file is no notebook.
+        ValueError: the file cannot be read, or is no notebook.
     """
     try:
         cells = json.loads(notebook.read_text(encoding="utf8"))["cells"]
         code = {n: "".join(cell["source"]) for n, cell in enumerate(cells) if cell["cell_type"] == "code"}
+    except OSError as error:
+        raise ValueError(f"this file cannot be read ({error.strerror or error}): ask for it again") from error
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError("this file is no notebook: ask for it again") from error
     return {n: name for n, source in code.items() if (name := grader_shown(source))}
@@ -142,11 +149,12 @@ def run(paths: Sequence[Path], seconds: float, gigabytes: float, out: Path | Non
 
     Raises:
         CommandError: nothing to grade, or the CSV cannot be written.
+        KeyboardInterrupt: somebody wants it to end; what was graded by then is printed, and written beside the CSV.
     """
-    if seconds <= 0 or gigabytes <= 0:
+    if not (0 < seconds < math.inf and 0 < gigabytes < MOST_GIGABYTES):
         raise CommandError("--seconds and --gigabytes must be positive numbers", 2)
-    if out is not None and not out.parent.is_dir():
-        raise CommandError(f"there is no folder {out.parent} for the CSV: make it first")
+    if out is not None:
+        _require_place(out)
     if importlib.util.find_spec("IPython") is None:
         raise CommandError(
             "grading runs notebooks, which needs IPython: pip install '.[book]' in the project's folder"
@@ -154,18 +162,47 @@ def run(paths: Sequence[Path], seconds: float, gigabytes: float, out: Path | Non
     notebooks = notebooks_in(paths)
     grades: list[Grade] = []
     progress = Console(stderr=True)
-    for notebook in track(
-        notebooks, "notebooks", console=progress, transient=True, disable=not progress.is_terminal
-    ):
-        grades += grade(notebook, seconds, gigabytes)
-    _print(grades)
-    if out is not None:
-        try:
-            _write(grades, out)
-        except OSError as error:
-            raise CommandError(f"{out} could not be written: {error.strerror or error}") from error
-        print(f"table: {out}")
+    try:
+        with _terminable():
+            for notebook in track(
+                notebooks, "notebooks", console=progress, transient=True, disable=not progress.is_terminal
+            ):
+                grades += grade(notebook, seconds, gigabytes)
+    except BaseException:
+        if grades:
+            _tell(grades, out and out.with_name(f"{out.stem}.partial{out.suffix}"))
+        raise
+    _tell(grades, out)
     return 0
+
+
+def _require_place(out: Path) -> None:
+    """Raise unless a CSV can be written there: better now than after an hour of grading."""
+    if not out.parent.is_dir():
+        raise CommandError(f"there is no folder {out.parent} for the CSV: make it first")
+    if out.is_dir() or not os.access(out if out.exists() else out.parent, os.W_OK):
+        raise CommandError(f"{out} cannot be written: choose another --out")
+
+
+@contextlib.contextmanager
+def _terminable() -> Iterator[None]:
+    """Take SIGTERM as Ctrl-C, so that no student's process is left behind without its limits."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _tell(grades: Sequence[Grade], out: Path | None) -> None:
+    _print(grades)
+    if out is None:
+        return
+    try:
+        _write(grades, out)
+    except OSError as error:
+        raise CommandError(f"{out} could not be written: {error.strerror or error}") from error
+    print(f"table: {out}")
 
 
 def _print(grades: Sequence[Grade]) -> None:

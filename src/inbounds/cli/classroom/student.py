@@ -40,7 +40,7 @@ def main(notebook: str, output: str, gigabytes: str) -> int:
             result = shell.run_cell("".join(cell["source"])).result
             if isinstance(result, Judgement):
                 said = {"cell": number, "passed": result.passed, "message": result.message}
-                print(json.dumps(said, ensure_ascii=False), file=report, flush=True)
+                print(json.dumps(said), file=report, flush=True)  # in ASCII: a line is a line
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -51,6 +52,8 @@ class NetworkConfig:
             raise ValueError(f"initialization must be pytorch or orthogonal, got {self.initialization!r}")
         if self.dtype not in DTYPES:
             raise ValueError(f"dtype must be float32 or float64, got {self.dtype!r}")
+        if not math.isfinite(self.policy_head_gain):
+            raise ValueError(f"policy_head_gain must be a finite number, got {self.policy_head_gain}")
 
 
 class ActorCritic:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import pyarrow.parquet as pq
 
 from inbounds.learning.storage.run_metadata import METADATA_KEY, parsed
 from inbounds.learning.storage.whole_files import damaged, says_nothing_of_the_file
+
+DIGEST_KEY = f"{METADATA_KEY}-sha256"
 
 
 def parquet_bytes(table: pa.Table, metadata: str) -> Any:
@@ -23,7 +26,7 @@ def parquet_bytes(table: pa.Table, metadata: str) -> Any:
     }
     sink = pa.BufferOutputStream()
     pq.write_table(
-        table.replace_schema_metadata({METADATA_KEY: metadata}),
+        table.replace_schema_metadata({METADATA_KEY: metadata, DIGEST_KEY: _digest(metadata, table.schema)}),
         sink,
         compression="zstd",
         compression_level=9,
@@ -46,7 +49,9 @@ def read_table(path: str | Path, remedy: str = "") -> pa.Table:
         DamagedFileError: it is damaged.
     """
     with _damage_named(path, remedy), pq.ParquetFile(path, page_checksum_verification=True) as file:
-        return file.read()
+        table = file.read()
+        _require_digest(table.schema)
+        return table
 
 
 def read_about(path: str | Path, remedy: str = "", keys: Collection[str] = ()) -> dict[str, Any]:
@@ -62,7 +67,9 @@ def read_about(path: str | Path, remedy: str = "", keys: Collection[str] = ()) -
         DamagedFileError: it is damaged, or says nothing of itself, or lacks a key.
     """
     with _damage_named(path, remedy):
-        found = about_of(pq.read_schema(path))
+        schema = pq.read_schema(path)
+        _require_digest(schema)
+        found = about_of(schema)
         if missing := [key for key in keys if key not in found]:
             raise ValueError(f"it does not say its {missing[0]}")
         return found
@@ -79,6 +86,23 @@ def about_of(schema: pa.Schema) -> dict[str, Any]:
         {'id': 'ours'}
     """
     return parsed((schema.metadata or {}).get(METADATA_KEY.encode()))
+
+
+def _digest(metadata: str, schema: pa.Schema) -> str:
+    """Return the SHA-256 of what Parquet's own checksums, which are of pages, do not cover."""
+    columns = [f"{field.name} {field.type}" for field in schema]
+    return hashlib.sha256("\n".join([metadata, *columns]).encode()).hexdigest()
+
+
+def _require_digest(schema: pa.Schema) -> None:
+    """Raise unless a schema is the one that was written; an older table has no digest."""
+    said = schema.metadata or {}
+    if (kept := said.get(DIGEST_KEY.encode())) is None:
+        return
+    if kept.decode(errors="replace") != _digest(
+        said.get(METADATA_KEY.encode(), b"").decode(errors="replace"), schema
+    ):
+        raise ValueError("the checksum of its columns and of what it says of itself is wrong")
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -24,6 +25,7 @@ from inbounds.learning.config import TrainConfig
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.parquet import about_of, parquet_bytes, read_table
 from inbounds.learning.storage.run_metadata import METADATA_KEY, config_from, metadata_of, parsed
+from inbounds.learning.storage.stored_config import describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import damaged, find, says_nothing_of_the_file, write_whole
 
@@ -174,7 +176,7 @@ def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = 
         rows = [config.seeds.index(seed) for seed in seeds]
         config = dataclasses.replace(config, seeds=tuple(seeds))
         tensors = {n: t if n in OF_THE_BOX else t[rows] for n, t in tensors.items()}
-    metadata = metadata_of(config, sha256=_digest(tensors))
+    metadata = metadata_of(config, sha256=_digest(tensors), sha256_config=_digest_of(describe(config)))
     write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
 
 
@@ -208,7 +210,11 @@ def load_policies(run: str | Path, remedy: str = "") -> list[TrainedPolicy]:
         if says_nothing_of_the_file(error):
             raise
         raise damaged(path, error, remedy) from error
-    if metadata.get("sha256") != _digest(tensors):
+    of_config = metadata.get("sha256_config")  # older files have none
+    if metadata.get("sha256") != _digest(tensors) or of_config not in (
+        None,
+        _digest_of(metadata.get("config")),
+    ):
         raise damaged(path, "its checksum is wrong", remedy)
     return policies_from(config_from(metadata), tensors)
 
@@ -245,6 +251,10 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
             f"the run has {len(policies)} seeds: choose a seed index from 0 to {len(policies) - 1}"
         )
     return policies[seed_index]
+
+
+def _digest_of(config: Any) -> str:
+    return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()
 
 
 def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:

@@ -93,7 +93,7 @@ class DialFolder:
         remedy = f"restore both (git checkout -- {folder}), or make them again (inbounds study dial run)"
         line = self.sum_file.read_text() if self.sum_file.is_file() else ""
         if line.split()[:1] != [hashlib.sha256(self.map_file.read_bytes()).hexdigest()]:
-            raise damaged(self.map_file, f"it is not the file that {self.sum_file} lists", remedy)
+            raise damaged(self.map_file, f"{self.sum_file.name} does not list it", remedy)
         return read_table(self.map_file, remedy)
 
 
@@ -158,7 +158,8 @@ def run_cells(
     Raises:
         BlockingIOError: another process runs in the folder.
     """
-    folder.work.mkdir(parents=True, exist_ok=True)
+    for path in (folder.work, folder.results):  # an impossible folder is found out now
+        path.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(held(folder.work))

@@ -76,6 +76,7 @@ def run_cell(
     """
     if _is_finished(cell, folder):
         return "was finished"
+    folder.cell_file(cell).parent.mkdir(parents=True, exist_ok=True)  # an impossible folder is found out now
     try:
         with CellLock.take(folder.work_of(cell)) as claim:
             if _is_finished(cell, folder):  # by whoever had the claim a moment ago
