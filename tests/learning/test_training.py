@@ -392,6 +392,7 @@ def test_presets_are_the_table() -> None:
         (lambda: TrainConfig(seeds=(1, 1)), "seeds must be different"),
         (lambda: TrainConfig(seeds=(1, 2**63)), "integers below 2⁶³"),
         (lambda: TrainConfig(epochs=0), "epochs must be positive"),
+        (lambda: TrainConfig(epochs=2.5), "epochs must be a whole number, got 2.5"),
         (lambda: TrainConfig(action_mode="clipped"), "clip or raw"),
     ],
 )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from inbounds.book.exercises.judging import Case, Judgement, judge_cases
+from inbounds.book.exercises.judging import Case, Judgement, judge_cases, judge_diagnosis
 
 SQUARE = [Case((3.0,), 9.0, {"that is the double": 6.0})]
 
@@ -28,3 +28,10 @@ def test_a_verdict_shows_itself() -> None:
     verdict = Judgement("f", False, "a < b")
     assert repr(verdict) == "✗ not yet: f: a < b"
     assert "a &lt; b" in verdict._repr_html_()
+
+
+def test_a_diagnosis_that_is_no_name_is_judged_all_the_same() -> None:
+    checks = {"sign": lambda f: "" if f(-1) < 0 else "it loses the sign"}
+    found = judge_diagnosis({"A": ["sign"]}, {"A": abs}, checks, "function", "earlier", "later")
+    assert found.passed is False
+    assert found.message == "no check is called ['sign']; there are sign"

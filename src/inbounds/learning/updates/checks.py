@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 
@@ -14,7 +16,7 @@ def check(
     unit: Sequence[str] = (),
     positive_or_none: Sequence[str] = (),
 ) -> None:
-    """Raise a ValueError that names the first field out of range.
+    """Raise a ValueError that names the first field out of range, or the first integer that is none.
 
     Args:
         config: a dataclass.
@@ -29,6 +31,10 @@ def check(
         Traceback (most recent call last):
         ValueError: gamma must lie in [0, 1], got 1.5
     """
+    for field in dataclasses.fields(config) if dataclasses.is_dataclass(config) else ():
+        value = getattr(config, field.name)
+        if field.type == "int" and (isinstance(value, bool) or not isinstance(value, Integral)):
+            raise ValueError(f"{field.name} must be a whole number, got {value!r}")
     rules = (
         (positive, "be positive", lambda x: x > 0),
         (not_negative, "not be negative", lambda x: x >= 0),
