@@ -79,7 +79,7 @@ def test_the_finding_follows_the_rows() -> None:
         "When both start equally quiet, the Beta ends above on 1 of 2 robots (found) and below on none."
     )
     fresh = [dataclasses.replace(each, study=2) for each in rows]
-    free = "a Gaussian whose σ is free, both start equally quiet: there the Beta"
+    free = "a Gaussian whose σ is the same in every state, both start equally quiet: there the Beta"
     assert free in winners.finding("x", fresh, "beta", "ppo")
     assert free not in winners.finding("x", [rows[0], fresh[1]], "beta", "ppo")
     assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("quiet")[2]
