@@ -103,8 +103,8 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
         told += f"; on {small} the difference is too small to matter"
     if all(row.study == 2 for row in here):
         return (
-            f"{first} In a second study, with fresh seeds and a Gaussian whose σ is the same in every state, both start "
-            f"equally quiet: there {told}."
+            f"{first} In a second study, with fresh seeds and a Gaussian whose σ is the same in every state, "
+            f"both start equally quiet: there {told}."
         )
     return f"{first} When both start equally quiet, {told}."
 
