@@ -33,6 +33,7 @@ LIVE = BUILD / "live"  # what the live robot loads, copied into the book
 PAGES = (
     "book",
     "notebooks",
+    "tests",  # the page of statements shows some
     "tools/build_book.py",
     "tools/notebook_cache.py",
     "tools/student_copies.py",

@@ -12,7 +12,7 @@ HOOK = Path(__file__).with_name("notebook_hook.py")
 
 
 def main() -> int:
-    if len(sys.argv) < 2:
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
         print("no notebook named: make notebooks NB=notebooks/actions_have_bounds.ipynb")
         return 2
     for name in sys.argv[1:]:

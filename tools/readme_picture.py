@@ -5,7 +5,7 @@
 Written as SVG by hand, so that the file is small and the same on every machine; colours that do on light and dark.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -90,4 +90,8 @@ def drawing() -> str:
 
 
 if __name__ == "__main__":
-    (Path(sys.argv[1]) if len(sys.argv) > 1 else TARGET).write_text(drawing(), encoding="utf8")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("file", nargs="?", type=Path, default=TARGET)
+    parser.parse_args().file.write_text(drawing(), encoding="utf8")

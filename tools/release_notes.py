@@ -6,6 +6,7 @@ Ready is: the tag is the package's version, CHANGELOG.md has that version with a
 repository is no longer the placeholder.
 """
 
+import argparse
 import re
 import sys
 from pathlib import Path
@@ -52,7 +53,11 @@ def read(name: str, pattern: str) -> str:
 
 def main(arguments: list[str]) -> int:
     """Print the notes of a tag; say on stderr why it cannot be released."""
-    (tag,) = arguments
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("tag")
+    tag = parser.parse_args(arguments).tag
     version = read("src/inbounds/__init__.py", r'^__version__ = "([^"]+)"')
     url = read("pyproject.toml", r'^Repository = "([^"]+)"')
     notes = (ROOT / "CHANGELOG.md").read_text(encoding="utf8")

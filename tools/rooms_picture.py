@@ -6,6 +6,7 @@ What may be imported is said by ``tests/test_architecture.py``. An arrow that ot
 import whatever can be reached from it.
 """
 
+import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -82,6 +83,9 @@ def picture(may_import: Mapping[str, set[str]]) -> str:
 
 
 def main() -> None:
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     sys.path.insert(0, str(ROOT))
     from tests.test_architecture import MAY_IMPORT
 

@@ -31,11 +31,15 @@ const now = () => Math.max(0, slides.findIndex((slide) => '#' + slide.id === loc
 const go = (to) => { location.hash = slides[Math.min(slides.length - 1, Math.max(0, to))].id; };
 const show = () => slides.forEach((slide, i) => slide.classList.toggle('shown', i === now()));
 addEventListener('hashchange', show);
-addEventListener('keydown', ({ key }) => {
+addEventListener('keydown', (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  const { key } = event;
   if (['ArrowRight', 'PageDown', ' '].includes(key)) go(now() + 1);
   else if (['ArrowLeft', 'PageUp'].includes(key)) go(now() - 1);
   else if (key === 'Home') go(0);
   else if (key === 'End') go(slides.length - 1);
+  else return;
+  event.preventDefault();
 });
 document.documentElement.classList.add('turned');
 show();
@@ -90,8 +94,7 @@ def deck(book: Path, name: str, out: Path) -> int:
         f'<section class="slide" id="{i}"><h2>{html.escape(title)}</h2><div class="said">{said}</div></section>'
         for i, (title, said) in enumerate(slides, 1)
     )
-    formulas = book / "_static" / "formulas.css"
-    styles = "" if not formulas.exists() else '<link rel="stylesheet" href="_static/formulas.css">'
+    styles = '<link rel="stylesheet" href="_static/formulas.css">'
     (out / f"{name}.html").write_text(
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
@@ -105,10 +108,9 @@ def deck(book: Path, name: str, out: Path) -> int:
 def formulas_for(book: Path, out: Path) -> None:
     """Put style and fonts of the formulas beside the decks."""
     static = book / "_static"
-    if (static / "formulas.css").exists():
-        (out / "_static").mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(static / "formulas.css", out / "_static" / "formulas.css")
-        shutil.copytree(static / "mathjax", out / "_static" / "mathjax", dirs_exist_ok=True)
+    (out / "_static").mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(static / "formulas.css", out / "_static" / "formulas.css")
+    shutil.copytree(static / "mathjax", out / "_static" / "mathjax", dirs_exist_ok=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -123,6 +125,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     missing = [name for name in names if not (args.html / "notebooks" / f"{name}.html").exists()]
     if missing:
         print(f"no page notebooks/{missing[0]} in {args.html}: run `make book` first", file=sys.stderr)
+        return 1
+    if not (args.html / "_static" / "formulas.css").exists():
+        print(
+            "the formulas of the book are not set: run `make book` where npm can be reached", file=sys.stderr
+        )
         return 1
     args.out.mkdir(parents=True, exist_ok=True)
     formulas_for(args.html, args.out)

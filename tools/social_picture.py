@@ -5,7 +5,7 @@
 Logit-normal densities on one action's box, in the colours of the logo. Services show no SVG.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import matplotlib
@@ -53,4 +53,8 @@ def draw(target: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1]) if len(sys.argv) > 1 else TARGET)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("file", nargs="?", type=Path, default=TARGET)
+    draw(parser.parse_args().file)

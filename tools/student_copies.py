@@ -223,7 +223,11 @@ def write_downloads(chapters: Path, html: Path) -> None:
         html: the built book, where `_sources/notebooks/` holds what the buttons link to.
     """
     for download in sorted((html / "_sources" / chapters.name).glob("*.ipynb")):
-        download.write_text(written(chapters / download.name), encoding="utf8")
+        if (chapters / download.name).is_file():
+            download.write_text(written(chapters / download.name), encoding="utf8")
+        else:  # of a page that the book no longer has, which Sphinx leaves where it is
+            download.unlink()
+            (html / chapters.name / f"{download.stem}.html").unlink(missing_ok=True)
 
 
 def digest(text: str) -> str:

@@ -13,6 +13,7 @@
 * A full stop behind a DOI or an address stays with it (see ``keep_full_stops``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
 * The theme that the system asks for is set before anything is drawn.
+* A page that quotes a number of another notebook, or continues its program, is read again when that one has changed.
 * The execution cache's folder is named by ``tools/build_book.py`` (a digest of package, data and pins).
 """
 
@@ -37,6 +38,7 @@ from inbounds.book.explorables.frame import javascript_files
 from inbounds.book.explorer.claims import SCRIPT as CLAIMS_SCRIPT
 from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
 from inbounds.book.explorer.picked_seeds import SCRIPTS as SEEDS_SCRIPTS
+from inbounds.book.pages.programs import continued
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
@@ -55,9 +57,35 @@ def use_named_cache(app: Sphinx, config: Config) -> None:
         config.nb_execution_cache_path = os.environ["INBOUNDS_NB_CACHE"]
 
 
-def copy_explorables(app: Sphinx, exception: Exception | None) -> None:
-    """Serve BokehJS and the explorables' scripts from the book itself."""
-    if exception is None and app.builder.format == "html":
+QUOTED = re.compile(r"\{glue:[a-z]*\}`([^`:]+\.ipynb)::")
+
+
+def sources(page: Path) -> set[Path]:
+    """Return the notebooks whose numbers a page quotes, and those whose program it continues.
+
+    Args:
+        page: a notebook, or Markdown.
+    """
+    found = {(page.parent / name).resolve() for name in QUOTED.findall(page.read_text(encoding="utf8"))}
+    earlier = continued(page) if page.suffix == ".ipynb" else None
+    while earlier is not None:
+        found.add(earlier.resolve())
+        earlier = continued(earlier)
+    return found
+
+
+def read_again(
+    app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]
+) -> list[str]:
+    """Return the pages that show something of a notebook that has changed, which Sphinx does not know."""
+    new = {Path(env.doc2path(name)).resolve() for name in added | changed}
+    others = sorted(env.found_docs - added - changed)
+    return [name for name in others if sources(Path(env.doc2path(name))) & new]
+
+
+def copy_explorables(app: Sphinx) -> None:
+    """Serve BokehJS and the explorables' scripts from the book itself; before pages name them with their checksums."""
+    if app.builder.format == "html":
         target = Path(app.outdir) / "_static" / FOLDER
         target.mkdir(parents=True, exist_ok=True)
         for script in [*javascript_files(), *chain(*OF_THE_STUDY.values())]:
@@ -230,5 +258,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("missing-reference", resolve_public_name)
     app.connect("doctree-resolved", set_numbers)
-    app.connect("build-finished", copy_explorables)
+    app.connect("builder-inited", copy_explorables)
+    app.connect("env-get-outdated", read_again)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

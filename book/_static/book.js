@@ -81,6 +81,7 @@
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   for (const row of document.querySelectorAll(".inbounds-loop")) {
     const films = [...row.querySelectorAll("video")];
+    if (!films.length) continue;
     let wanted = !still.matches, seen = false;
     const start = () => {
       if (wanted && seen) for (const film of films) { film.muted = true; film.play().catch(() => {}); }

@@ -3,12 +3,16 @@
   "use strict";
 
   const KEY = "inbounds-guesses";
-  let kept = {};
+  let kept = {}, stores = true;
   const read = () => {
-    try { kept = { ...JSON.parse(localStorage.getItem(KEY)) }; } catch { /* then guesses hold for this page */ }
+    if (!stores) return;
+    try {
+      const stored = Object.entries(JSON.parse(localStorage.getItem(KEY)) ?? {});
+      kept = Object.fromEntries(stored.filter(([, one]) => typeof one?.guess === "string"));
+    } catch { /* then guesses hold for this page */ }
   };
   const keep = () => {
-    try { localStorage.setItem(KEY, JSON.stringify(kept)); } catch { /* the same */ }
+    try { localStorage.setItem(KEY, JSON.stringify(kept)); } catch { stores = false; /* the same */ }
   };
 
   const NEAR = 0.5;
@@ -147,7 +151,12 @@
         event.preventDefault(); /* or it would press the button that has the focus by then */
         check(box);
       });
-      if (guess.dataset.name in kept) { show(guess, kept[guess.dataset.name].guess); tell(guess); }
+      const mine = kept[guess.dataset.name];
+      if (mine) { /* by today's truth, which may have changed since */
+        mine.score = score(guess, mine.guess);
+        show(guess, mine.guess);
+        tell(guess);
+      }
     }
     lock(box);
     box.querySelector(".guess-check").addEventListener("click", () => check(box));

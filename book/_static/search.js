@@ -90,7 +90,9 @@
     const results = Search.performTermsSearch(searchTerms, excluded);
     const objects = [...objectTerms].flatMap((term) => Search.performObjectSearch(term, objectTerms))
       .filter((result) => result[0] === "book/api").sort((a, b) => b[4] - a[4]);
-    const pages = rank(query, window.inboundsPages, new Set(results.map(([name]) => name))).slice(0, MOST);
+    const found = new Set(results.map(([name]) => name));
+    const asked = query.replace(/(^|\s)-\S+/g, " ");
+    const pages = rank(asked, window.inboundsPages, found).filter(({ address }) => !excluded.size || found.has(address)).slice(0, MOST);
     const names = [...new Map(objects.map((each) => [each[1], each])).values()].slice(0, 10);
     /* A name of the package, written as one, is what was asked for. */
     const asName = /[._]/.test(query);
@@ -102,7 +104,7 @@
       add(item, "span", about, "kind");
     });
     if (asName) showNames();
-    pages.forEach((page) => showPage(list, page, terms(query)));
+    pages.forEach((page) => showPage(list, page, terms(asked)));
     if (!asName) showNames();
     Search.stopPulse();
     Search.title.textContent = "Results";

@@ -190,3 +190,42 @@ def test_scripts_have_their_order_and_new_addresses_when_they_change(
     after = extension.addresses(files, "../_static/x/")
     assert after[0] != before[0]
     assert after[1] == before[1]
+
+
+def notebook(path: Path, text: str, **about: str) -> Path:
+    cells = [{"cell_type": "markdown", "source": text, "metadata": {}}]
+    said = {"cells": cells, "metadata": {"program": about}, "nbformat": 4, "nbformat_minor": 5}
+    path.write_text(json.dumps(said), encoding="utf8")
+    return path
+
+
+def test_a_page_is_read_again_when_what_it_shows_of_another_has_changed(
+    extension: ModuleType, tmp_path: Path
+) -> None:
+    notebook(tmp_path / "first.ipynb", "# First")
+    notebook(tmp_path / "second.ipynb", "# Second", continues="first")
+    notebook(tmp_path / "third.ipynb", "# Third", continues="second")
+    notebook(tmp_path / "quoting.ipynb", "{glue:text}`other.ipynb::x:.1f` and {glue:text}`own`")
+    (tmp_path / "other.ipynb").write_text((tmp_path / "first.ipynb").read_text())
+    env = SimpleNamespace(
+        found_docs={path.stem for path in tmp_path.glob("*.ipynb")},
+        doc2path=lambda name: tmp_path / f"{name}.ipynb",
+    )
+    for changed, again in (
+        ("first", ["second", "third"]),
+        ("second", ["third"]),
+        ("other", ["quoting"]),
+        ("third", []),
+    ):
+        assert extension.read_again(None, env, set(), {changed}, set()) == again
+
+
+def test_the_books_own_pages_quote_and_continue(extension: ModuleType) -> None:
+    """Were the pattern wrong, no page of the book would have sources."""
+    found = {
+        path.stem: {source.stem for source in extension.sources(path)}
+        for path in (EXTENSIONS.parents[1] / "notebooks").glob("*.ipynb")
+    }
+    assert found["which_policy"] == {"storing_actions", "why"}
+    assert found["trpo"] >= {"policy_that_learns"}
+    assert not found["greedy_action"]

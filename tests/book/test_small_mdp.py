@@ -156,6 +156,8 @@ def test_a_fall_is_charged_by_its_probability() -> None:
         ({"reward": torch.zeros(6, 2)}, "coefficients of 1, a and a²"),
         ({"right": 2 * torch.eye(6)}, "right must hold probabilities"),
         ({"start": -torch.ones(6)}, "start must hold probabilities"),
+        ({"start": torch.full((6,), 0.1)}, "start must sum to one"),
+        ({"left": torch.full((6, 6), torch.nan)}, "left must hold probabilities"),
         ({"gamma": 1.0}, r"gamma must be in \[0, 1\)"),
     ],
 )

@@ -224,9 +224,14 @@ def test_downloads_are_student_copies(tmp_path: Path) -> None:
     for name in ("01_a.ipynb", "02_not_in_the_book.ipynb"):
         nbformat.write(exercise(), chapters / name)
     nbformat.write(exercise(), downloads / "01_a.ipynb")
+    page = tmp_path / "html" / "notebooks" / "03_gone.html"  # of a chapter that the book no longer has
+    page.parent.mkdir()
+    page.touch()
+    nbformat.write(exercise(), downloads / "03_gone.ipynb")
     for _ in range(2):  # a page that was not built anew has its copy already
         tool.write_downloads(chapters, tmp_path / "html")
         assert [path.name for path in downloads.iterdir()] == ["01_a.ipynb"]
+        assert not page.exists()
         assert "secret" not in json.dumps(json.loads((downloads / "01_a.ipynb").read_text()))
 
 

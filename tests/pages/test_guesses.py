@@ -124,6 +124,23 @@ def test_a_wrong_choice_is_told_why(context: BrowserContext, address: str) -> No
     assert len(told.inner_text()) > len(told.locator("strong").inner_text()) + 20
 
 
+def test_a_kept_guess_is_scored_by_the_truth_of_today(context: BrowserContext, address: str) -> None:
+    """Numbers of the study change as cells arrive; what is garbled is no guess, and keeps no box from working."""
+    page = context.new_page()
+    page.goto(address + NUMBERS[0])
+    count = answered(page, right=True)
+    page.evaluate("""() => {
+      const kept = JSON.parse(localStorage.getItem('inbounds-guesses'));
+      const numbers = Object.values(kept).filter((one) => !Number.isNaN(Number(one.guess)));
+      for (const one of numbers) one.guess = String(Number(one.guess) * 1000 + 1e6);
+      localStorage.setItem('inbounds-guesses', JSON.stringify({ ...kept, 'p-of-old': null, another: 7 }));
+    }""")
+    page.reload()
+    numbers = page.locator(".inbounds-guess[data-kind=number] .guess-result")
+    assert all(text.startswith("Off: you said") for text in numbers.all_inner_texts())
+    assert f"of {count} guesses" in page.locator(".guess-tally").first.inner_text()
+
+
 def test_a_browser_that_keeps_nothing_still_scores(context: BrowserContext, address: str) -> None:
     page = context.new_page()
     failed: list[str] = []

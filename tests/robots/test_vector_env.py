@@ -239,9 +239,10 @@ def test_actions_that_are_not_finite_are_named():
     ("kwargs", "message"),
     [
         ({"name": "HalfCheetah-v4"}, "there are Hopper-v5, Walker2d-v5"),
-        ({"num_envs": 0}, "num_envs must be at least 1"),
-        ({"max_episode_steps": 0}, "max_episode_steps must be at least 1"),
-        ({"num_threads": 0}, "num_threads must be at least 1"),
+        ({"num_envs": 0}, "num_envs must be a whole number, at least 1"),
+        ({"max_episode_steps": 0}, "max_episode_steps must be a whole number, at least 1"),
+        ({"max_episode_steps": 2.5}, "max_episode_steps must be a whole number"),
+        ({"num_threads": 0}, "num_threads must be a whole number, at least 1"),
         ({"action_mode": "squash"}, "'clip' or 'raw'"),
         ({"render_mode": "human"}, "None or 'rgb_array'"),
     ],

@@ -116,11 +116,37 @@ def test_a_seed_left_out_is_counted_and_changes_nothing_else(function: Callable[
         assert estimate.missing in (1, 2)  # of a pair, both
         assert estimate.n == 4
         assert np.isfinite([estimate.value, estimate.low, estimate.high]).all()
+    else:  # a p-value, or a test of equivalence: that of the seeds that are there
+        there, whole = [x for x in HOLE if not np.isnan(x)], WHOLE
+        if function is ON_SEEDS[5]:  # in pairs
+            whole = [y for x, y in zip(HOLE, WHOLE, strict=True) if not np.isnan(x)]
+            expected: object = statistics.permutation_test(whole, there, rng(), paired=True)
+        elif function is ON_SEEDS[4]:
+            expected = statistics.permutation_test(there, whole, rng())
+        else:
+            expected = statistics.equivalence(there, whole, margin=1.0)
+        assert result == expected
     if function is ON_SEEDS[0]:
         without = statistics.bootstrap([1.0, 2.0, 4.0, 3.0], rng())
         assert result == statistics.Estimate(
             without.value, without.low, without.high, 4, 1, 0.95, "IQM", ceiling=without.ceiling
         )
+
+
+def test_robots_that_are_decided_each_its_own_way_leave_a_width() -> None:
+    """Newcombe's limits of each robot, their distances added in quadrature: 1 and 0 of five seeds against five."""
+    up, down = [4, 5, 6, 7, 8], [1, 2, 3, 0, -5]
+    found = statistics.probability_of_improvement({"A": up, "B": down}, {"A": down, "B": up}, rng())
+    one = statistics.probability_of_improvement({"A": up}, {"A": down}, rng())
+    assert found.value == 0.5
+    assert found.low == pytest.approx(0.5 - (1 - one.low) / 2)
+    assert found.high == pytest.approx(0.5 + (1 - one.low) / 2)
+
+
+def test_a_tie_of_means_has_one_interval() -> None:
+    a, b = [1.0, 9.0, 0.0, 10.0, 5.0], [2.0, 8.0, 4.0, 6.0, 5.0]
+    there, back = statistics.minus(a, b), statistics.minus(b, a)
+    assert (there.low, there.high) == (-back.high, -back.low)
 
 
 def test_half_a_pair_is_no_pair() -> None:
@@ -141,6 +167,7 @@ def test_a_diverged_seed_leaves_the_whole_learning_curve() -> None:
 def test_too_few_seeds_and_unknown_settings_are_refused() -> None:
     for bad, fix in [
         (lambda: statistics.bootstrap([1.0], rng()), "run more seeds"),
+        (lambda: statistics.bootstrap([], rng()), "0 of 0 seeds have a finite score"),
         (lambda: statistics.bootstrap([NAN, NAN, 1.0], rng(), missing="exclude"), "run more seeds"),
         (lambda: statistics.bootstrap(WHOLE, rng(), missing="drop"), "raise, exclude"),
         (lambda: statistics.bootstrap(WHOLE, rng(), statistic="median"), "mean, iqm"),

@@ -6,6 +6,7 @@ in the *next* step, would put a transition into every rollout in which the actio
 """
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any, Literal
 
 import gymnasium
@@ -335,5 +336,5 @@ def _check_arguments(name: str, action_mode: str, render_mode: str | None, count
     if render_mode not in (None, "rgb_array"):
         raise ValueError(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
     for argument, count in counts.items():
-        if count < 1:
-            raise ValueError(f"{argument} must be at least 1, got {count}")
+        if not isinstance(count, Integral) or count < 1:
+            raise ValueError(f"{argument} must be a whole number, at least 1, got {count}")

@@ -157,12 +157,15 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
         >>> sorted(by_way(outcomes.finished["standard-hopper-ppo-beta"]))
         ['mean', 'median', 'mode', 'sample']
     """
-    return {
-        way: marked(statistics.mean_of(values, missing="exclude"), outcome)
-        if countable(values) >= 2
-        else None
-        for way, values in outcome.ways.items()
-    }
+    found: dict[str, Estimate | None] = {}
+    for way, values in outcome.ways.items():
+        found[way] = None
+        if countable(values) >= 2:
+            diverged = int(
+                (outcome.diverged & np.isfinite(values)).sum()
+            )  # those without a return are left out
+            found[way] = dataclasses.replace(statistics.mean_of(values, missing="exclude"), diverged=diverged)
+    return found
 
 
 def differences(

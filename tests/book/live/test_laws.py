@@ -106,6 +106,26 @@ def test_spread_widens_a_law_about_its_mode_and_zero_stills_it(family: str) -> N
         assert wide["mode"] == pytest.approx(plain["mode"])
 
 
+@pytest.mark.parametrize("spread", [0, 0.05, 1])
+@pytest.mark.parametrize("family", export.NAMES)
+def test_the_curve_of_a_narrow_law_is_seen(family: str, spread: float) -> None:
+    """Its highest computed point is near its peak, and several are not far below: a fifth of the peak, or more."""
+    code = """
+    const law = live.laws[values.family];
+    return values.outputs.map(([a, b]) => {
+      const p = law.parameters(a, b, values.limits, values.spread);
+      const units = live.Densities.units(law, p);
+      return { units, heights: units.map((u) => law.density(p, u)), peak: law.density(p, law.mode(p)) };
+    });
+    """
+    outputs = [[0.31, -1.5], [-0.47, 0.0], [0.0, -3.0], [0.012, -6.0]]
+    given = {"family": family, "outputs": outputs, "limits": LIMITS, "spread": spread}
+    for curve in run(code, given, engine=False):
+        assert curve["units"] == sorted(curve["units"])
+        assert max(curve["heights"]) >= 0.99 * curve["peak"] > 0
+        assert sum(height > curve["peak"] / 5 for height in curve["heights"]) >= 5
+
+
 @pytest.mark.parametrize("family", export.NAMES)
 def test_a_policy_acts_as_in_python(family: str) -> None:
     """Float64 sums in JavaScript, float32 in Python: they agree to a few float32 roundings."""

@@ -100,5 +100,8 @@ def licence_of(package: str) -> str:
 
 
 if __name__ == "__main__":
-    if why := write(Path(sys.argv[1])):
+    folder = Path(sys.argv[1])
+    if folder.exists() and any(folder.iterdir()) and not (folder / "status.js").is_file():
+        sys.exit(f"{folder} has something else in it, which would be deleted: name a new folder")
+    if why := write(folder):
         print(f"The live robot: films only. {why}")

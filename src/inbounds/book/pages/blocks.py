@@ -167,11 +167,11 @@ def _with_methods(old: str, new: str) -> str:
 
 
 def _class_parts(text: str) -> tuple[str, dict[str, str]]:
-    """Return a class's first line, and its methods by name."""
+    """Return a class as far as its first line, comments and decorators included, and its methods by name."""
     lines = text.splitlines()
     (node,) = ast.parse(text).body
     assert isinstance(node, ast.ClassDef)
-    header, methods, start = lines[node.lineno - 1], {}, node.lineno
+    header, methods, start = "\n".join(lines[: node.lineno]), {}, node.lineno
     for member in node.body:
         methods[_name_of(member)] = "\n".join(lines[start : member.end_lineno]).strip("\n")
         start = member.end_lineno or 0

@@ -52,8 +52,9 @@ class NetworkConfig:
             raise ValueError(f"initialization must be pytorch or orthogonal, got {self.initialization!r}")
         if self.dtype not in DTYPES:
             raise ValueError(f"dtype must be float32 or float64, got {self.dtype!r}")
-        if not math.isfinite(self.policy_head_gain):
-            raise ValueError(f"policy_head_gain must be a finite number, got {self.policy_head_gain}")
+        for name in ("policy_head_gain", "value_head_gain"):
+            if not math.isfinite(gain := getattr(self, name)):
+                raise ValueError(f"{name} must be a finite number, got {gain}")
 
 
 class ActorCritic:

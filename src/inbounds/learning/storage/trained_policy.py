@@ -167,7 +167,9 @@ class TrainedPolicy:
                 f"observations must have the shape [{self._network.sizes[0]}] or [B, {self._network.sizes[0]}], "
                 f"got {list(obs.shape)}"
             )
-        if not np.isfinite(obs).all():
+        with np.errstate(over="ignore"):  # said below
+            finite = np.isfinite(obs.astype(self._dtype)).all()
+        if not finite:
             raise ValueError(
                 "an observation is NaN or infinite, and there is no action for that: look at the sensor, or at the "
                 "environment, that it came from"

@@ -118,8 +118,9 @@ def probability_of_improvement(
     Agarwal et al. (2021, section 4.3), with their stratified bootstrap interval. For one environment it is the
     Mann–Whitney U over the number of pairs, and its interval is the score interval that Newcombe (2006, part 2)
     recommends, which stays honest near 0 and 1: where one policy wins every comparison, a bootstrap has nothing to
-    resample and its interval no width. Where that happens on all of several environments, Newcombe's interval for one
-    of them (the one with the fewest seeds) is given, which is too wide rather than too narrow.
+    resample and its interval no width. Where every one of several environments is decided, all one way, Newcombe's
+    interval for one of them (the one with the fewest seeds) is given, which is too wide rather than too narrow. Where
+    they are decided, but not all one way, the distances of Newcombe's limits from the shares are added in quadrature.
 
     It says how often, not by how much. Over six environments with ten seeds a side the bootstrap interval covers
     94–95 % of Normal policies' probabilities up to 0.92, and 91 % at 0.98 (simulated, 1500 samples each).
@@ -161,6 +162,15 @@ def probability_of_improvement(
     sizes = len(a[few]), len(b[few])
     if len(a) == 1 or value in (0.0, 1.0):
         low, high = map(np.asarray, _newcombe(value, *sizes, level))
+    elif all(each in (0.0, 1.0) for each in values):
+        ends = [
+            _newcombe(float(v), len(a[name]), len(b[name]), level) for name, v in zip(a, values, strict=True)
+        ]
+        below, above = (
+            np.array([abs(v - end[i]) for v, end in zip(values, ends, strict=True)]) for i in (0, 1)
+        )
+        low = np.asarray(value - np.linalg.norm(below) / len(a))
+        high = np.asarray(value + np.linalg.norm(above) / len(a))
     else:
         low, high = _percentiles(np.mean(replicates, 0), level)
     return Estimate(

@@ -63,7 +63,7 @@ def minus(first: ArrayLike, second: ArrayLike) -> Estimate:
         (1.0, True)
     """
     a, b = (np.asarray(x, np.float64) for x in (first, second))
-    if np.nanmean(a) < np.nanmean(b):
+    if (np.nanmean(a), tuple(a)) < (np.nanmean(b), tuple(b)):
         turned = minus(b, a)
         return replace(turned, value=-turned.value, low=-turned.high, high=-turned.low)
     return _minus(tuple(a), tuple(b))
@@ -136,5 +136,5 @@ def combination(groups: Sequence[Floats], weights: Sequence[float]) -> Estimate:
     low, high = limits(replicates, LEVEL, "expanded", int(sizes.min()), freedom)
     value = np.asarray(sum(w * x.mean() for w, x in zip(weights, kept, strict=True)))
     ceiling = coverage_ceiling(len(kept[0])) if len(kept) == 1 else 1.0
-    name = "difference of means"
+    name = "mean" if len(kept) == 1 else "difference of means"
     return Estimate(value, low, high, int(sizes.min()), lost, LEVEL, name, ceiling=ceiling)

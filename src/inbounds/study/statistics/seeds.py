@@ -42,7 +42,7 @@ def finite_seeds(values: ArrayLike, missing: Missing = "raise", at_least: int = 
         raise ValueError(f"missing must be one of {', '.join(get_args(Missing))}, got {missing!r}")
     if scores.ndim == 0:
         raise ValueError("expected an array with the seeds on its first axis, got a single number")
-    there = np.isfinite(scores).reshape(len(scores), -1).all(-1)  # [S]
+    there = np.isfinite(scores).all(tuple(range(1, scores.ndim)))  # [S]
     if missing == "raise" and not there.all():
         raise MissingSeedError(
             f"no finite score at seed position {', '.join(map(str, np.flatnonzero(~there)))} of {len(scores)}: "

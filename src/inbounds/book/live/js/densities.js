@@ -9,6 +9,14 @@ inbounds.live.Densities = class {
   static HEIGHT = 78; // of a plot [CSS pixels]
   static POINTS = 72;
 
+  // Where a curve is computed, in order: evenly, and around the law's bulk, which may be narrower than that.
+  static units(law, p) {
+    const { REACH, POINTS } = inbounds.live.Densities;
+    const evenly = Array.from({ length: POINTS }, (_, i) => -REACH + (2 * REACH * (i + 0.5)) / POINTS);
+    const around = Array.from({ length: 33 }, (_, i) => law.near(p, (i - 16) / 4));
+    return [...evenly, ...around.filter((unit) => Math.abs(unit) <= REACH)].sort((a, b) => a - b);
+  }
+
   constructor(canvas, motors, family) {
     this.canvas = canvas;
     this.motors = motors;
@@ -54,11 +62,11 @@ inbounds.live.Densities = class {
     paint.font = `11px ${colors.font}`;
     paint.fillText(name, 0, 11, width);
 
-    const at = (i) => -REACH + (2 * REACH * (i + 0.5)) / POINTS;
-    const heights = Array.from({ length: POINTS }, (_, i) => this.law.density(p, at(i)));
+    const units = inbounds.live.Densities.units(this.law, p);
+    const heights = units.map((unit) => this.law.density(p, unit));
     const highest = Math.max(...heights, 1e-9);
     paint.beginPath();
-    heights.forEach((h, i) => paint.lineTo(x(at(i)), base - ((base - top - 3) * h) / highest));
+    heights.forEach((h, i) => paint.lineTo(x(units[i]), base - ((base - top - 3) * h) / highest));
     paint.strokeStyle = colors.curve;
     paint.lineWidth = 2;
     paint.stroke();

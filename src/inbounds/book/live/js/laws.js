@@ -19,12 +19,13 @@ inbounds.live.laws = (() => {
     mu: first,
     sigma: Math.exp(clamp(second, limits.log_std_min, limits.log_std_max)) * spread,
   });
-  // A law without spread has no density; it is drawn as a narrow one.
+  // A law without spread has no density; it is drawn as a narrow one. `near` is the unit action t spreads from its middle.
   const drawable = (sigma) => Math.max(sigma, 1e-3);
 
   const gaussian = {
     parameters: normalParameters,
     draw: ({ mu, sigma }, noise) => mu + sigma * noise,
+    near: ({ mu, sigma }, t) => mu + drawable(sigma) * t,
     mean: ({ mu }) => mu,
     median: ({ mu }) => mu,
     mode: ({ mu }) => mu,
@@ -42,6 +43,7 @@ inbounds.live.laws = (() => {
   const logitNormal = {
     parameters: normalParameters,
     draw: ({ mu, sigma }, noise) => squash(mu + sigma * noise),
+    near: ({ mu, sigma }, t) => squash(mu + drawable(sigma) * t),
     mean: ({ mu, sigma }) => expectation(squash, mu, sigma),
     median: ({ mu }) => squash(mu),
     // The higher of two peaks is on the side of mu; at a tie the upper one.
@@ -66,6 +68,10 @@ inbounds.live.laws = (() => {
       if (p.still) return beta.mode(p);
       const share = normalCdf(noise);
       return 2 * bisect((x) => betaCdf(x, p.alpha, p.beta) - share, 0, 1) - 1;
+    },
+    near(p, t) {
+      const total = p.alpha + p.beta;
+      return beta.mode(p) + 2 * t * Math.sqrt((p.alpha * p.beta) / (total + 1)) / total;
     },
     mean: ({ alpha, beta }) => (2 * alpha) / (alpha + beta) - 1,
     median: ({ alpha, beta }) => 2 * bisect((x) => betaCdf(x, alpha, beta) - 0.5, 0, 1) - 1,

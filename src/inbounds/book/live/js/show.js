@@ -106,12 +106,15 @@ inbounds.live.Show = class {
   change(first = false) {
     const { policies } = inbounds.live.catalogue;
     const before = (this.changing ?? Promise.resolve()).catch(() => {}); // what failed was said, and is over
+    const turn = (this.turn = (this.turn ?? 0) + 1);
     this.changing = before.then(async () => {
+      if (turn !== this.turn) return; // a later choice waits: only that one is carried out
       this.busy = true;
+      const { robot, seed, untrained } = this;
       try {
         for (const [i, panel] of this.panels.entries()) {
           panel.which.fill(i ? { "": "none", ...policies } : policies, panel.policy);
-          await panel.open(this.mujoco, this.robot, this.seed, this.untrained);
+          await panel.open(this.mujoco, robot, seed, untrained);
         }
       } catch (error) {
         for (const panel of this.panels) panel.close();
