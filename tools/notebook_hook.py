@@ -100,7 +100,12 @@ def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
         for name in TRUTH.findall(cell.source) if cell.cell_type == "markdown" else ():
             if name not in known[""]:
                 found.append(f"cell {number}: has a guess at {name!r}, which no cell glues")
-        for other, name, how in QUOTED.findall(cell.source) if cell.cell_type == "markdown" else ():
+        for role in QUOTED.finditer(cell.source) if cell.cell_type == "markdown" else ():
+            other, name, how = role[1] or "", role[2], role[3] or ""
+            if other and role[3] is None:
+                found.append(
+                    f"cell {number}: quotes {name!r} of {other} without the colon that ends it: {name}:"
+                )
             if other not in known:
                 known[other] = glued(nbformat.read(ROOT / "notebooks" / other, 4))
             if name not in known[other]:

@@ -202,6 +202,12 @@ def quote(cell: nbformat.NotebookNode, value: str) -> None:
             ),
             "quotes 'answer', which no cell glues",
         ),
+        (
+            lambda cell: (
+                cell.clear() or cell.update(nbformat.v4.new_markdown_cell("{glue:text}`why.ipynb::std-beta`"))
+            ),
+            "quotes 'std-beta' of why.ipynb without the colon that ends it: std-beta:",
+        ),
         (lambda cell: quote(cell, "np.float64(42.0)"), "formats 'answer', which is no plain number"),
     ],
 )
