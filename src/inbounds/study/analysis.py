@@ -159,12 +159,9 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
     """
     found: dict[str, Estimate | None] = {}
     for way, values in outcome.ways.items():
-        found[way] = None
-        if countable(values) >= 2:
-            diverged = int(
-                (outcome.diverged & np.isfinite(values)).sum()
-            )  # those without a return are left out
-            found[way] = dataclasses.replace(statistics.mean_of(values, missing="exclude"), diverged=diverged)
+        mean = statistics.mean_of(values, missing="exclude") if countable(values) >= 2 else None
+        diverged = int((outcome.diverged & np.isfinite(values)).sum())  # those without a return are left out
+        found[way] = mean and dataclasses.replace(mean, diverged=diverged)
     return found
 
 

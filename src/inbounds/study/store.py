@@ -10,7 +10,6 @@ A cell is finished when its Parquet file is there; that is written last, whole, 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import shlex
@@ -150,11 +149,11 @@ class StudyFolder:
         """Return which files of a finished cell are not there, or are not those of their checksums or of the study."""
         sums = self.checksums()
         wrong = [f for f in self.files(cell) if not f.is_file() or sums.get(self._name(f)) != sha256(f)]
-        with contextlib.suppress(FileNotFoundError):
-            try:
+        try:
+            if not wrong:
                 read_metadata(self.cell_file(cell))
-            except DamagedFileError:
-                wrong = wrong or [self.cell_file(cell)]
+        except DamagedFileError:
+            return [self.cell_file(cell)]
         return wrong
 
     def load_policies(self, cell: Cell) -> list[TrainedPolicy]:
@@ -184,21 +183,15 @@ class StudyFolder:
         return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}
 
     def publish(self, contents: Mapping[Path, Any]) -> None:
-        """Write files of the results, each whole, the last one last, and their checksums before them.
-
-        Args:
-            contents: bytes or buffers by path.
-        """
+        """Write files of the results, bytes or buffers by path: each whole, the last last, their checksums before."""
         self.results.mkdir(parents=True, exist_ok=True)
         new = {self._name(path): hashlib.sha256(data).hexdigest() for path, data in contents.items()}
         with file_lock(self.results / ".lock"):
             sums = self.checksums() | new
             lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
             write_whole(self.results / CHECKSUMS_FILE, lines.encode())
-            for (
-                path,
-                data,
-            ) in contents.items():  # below the lock: of two writers of a file the last one's sum holds
+            # Below the lock: of two writers of a file the last one's sum holds.
+            for path, data in contents.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 write_whole(path, data)
 
