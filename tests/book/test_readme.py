@@ -11,7 +11,7 @@ from inbounds.book.report.equal_start import grade, laws, outcomes_of_both
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast, change, differences
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.words import spoken, verdict
+from inbounds.study.words import spoken
 from tools import readme_picture
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,17 +51,20 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert f"is {lead(outcomes, 'HalfCheetah')}." in said
 
 
-def test_a_beta(outcomes: Outcomes) -> None:
-    told = [verdict(each) for each in differences(outcomes, PPO_BETA, "final").values()]
-    assert (told.count("higher"), told.count("lower"), len(told)) == (4, 0, 6)
-    said = bullet("try a Beta")
-    assert "on 4 of 6 robots and below it on none" in said
-    quiet = answers.of(laws(outcomes_of_both(outcomes)), law="beta", algorithm="ppo", endpoint="final")
-    assert all(row.study == 2 for row in quiet)
-    grades = Counter(grade(row) for row in quiet if answers.sign(row) > 0)
-    assert grades == {"found with fresh seeds": 1, "suggested": 1}
-    assert "fresh seeds and a Gaussian whose σ is free, above on 2 of 6 (found on 1, suggested on 1)" in said
-    assert -1 not in map(answers.sign, quiet)
+def test_a_law(outcomes: Outcomes) -> None:
+    rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
+    assert (
+        answers.advice("ppo", answers.first_choice(rows)) == "Under PPO, take the law that your library has."
+    )
+    said = bullet("Then take the law that your library has.")
+    final, area = (answers.of(rows, law="beta", endpoint=e) for e in ("final", "area"))
+    assert all(row.study == 2 for row in (*final, *area))
+    above, below = (Counter(grade(row) for row in final if answers.sign(row) == way) for way in (1, -1))
+    assert above == {"found with fresh seeds": 1, "suggested": 1}
+    assert "above a Gaussian on 2 of 6 robots (found on 1, suggested on 1) and below it on none" in said
+    assert not below
+    assert [grade(row) for row in area if answers.sign(row) < 0] == ["suggested"]
+    assert "its learning curve lies lower on 1 (suggested)" in said
 
 
 def test_the_median() -> None:

@@ -93,13 +93,24 @@ def counted(rows: Sequence[Evidence]) -> str:
 
 
 def short(rows: Sequence[Evidence]) -> str:
-    """Return `counted` without how well each is founded, and without the robots on which no difference is found.
+    """Return `counted` in fewer words: where a law is above and below, without grades.
 
     Example:
         >>> short([])
         'not run yet'
     """
-    return re.sub(r" \(.*?\)", "", counted(rows)).partition(", no difference")[0]
+    return re.sub(r" robots?| \(.*?\)|, (too small|no difference).*", "", counted(rows))
+
+
+def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
+    """Return `short` of the final returns, and on how many robots the law is below by area, where it is.
+
+    Example:
+        >>> in_short([], [])
+        'not run yet'
+    """
+    below = sum(sign(row) < 0 for row in area)
+    return short(final) + (f" (by area, below on {below})" if below else "")
 
 
 def in_brackets(rows: Sequence[Evidence]) -> str:
