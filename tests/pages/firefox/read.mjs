@@ -63,6 +63,13 @@ try {
 }
 console.log(JSON.stringify(seen));
 
+// With the size puppeteer sets the orientation of the screen, a command that Firefox ESR 140 does not know.
+async function resize(page, width) {
+  await page.setViewport({ width, height: 800 }).catch((error) => {
+    if (!/unknown command|unsupported operation/.test(error.message)) throw error;
+  });
+}
+
 async function read(name) {
   const page = await browser.newPage();
   page.setDefaultTimeout(PATIENCE);
@@ -75,14 +82,14 @@ async function read(name) {
     if (!request.url().startsWith(start) && !/^(data|blob|about):/.test(request.url())) found.outside.push(request.url());
   });
   for (const width of WIDTHS) {
-    await page.setViewport({ width, height: 800 });
+    await resize(page, width);
     if (width === WIDTHS[0]) await page.goto(start + name, { waitUntil: "load" });
     await page.evaluate(`(${AT_REST})()`);
     found.wide[width] = await page.evaluate(
       () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
     );
   }
-  await page.setViewport({ width: WIDTHS[0], height: 800 });
+  await resize(page, WIDTHS[0]);
   for (const [what, [where, act, said]] of Object.entries(TOUCHED)) {
     const place = await page.$(where);
     if (!place) continue;
