@@ -1,4 +1,5 @@
 import copy
+import dataclasses
 import json
 import os
 import pickle
@@ -247,6 +248,18 @@ def test_another_configuration_in_the_policies_file_is_damage(tmp_path: Path) ->
     del changed["sha256_config"]  # as an older file
     safetensors.numpy.save_file(tensors, path, {METADATA_KEY: json.dumps(changed)})
     assert load_policies(path)[0].config.env == "point-v2"
+
+
+@pytest.mark.parametrize("normalised", [True, False])
+def test_an_observation_beyond_single_precision(normalised: bool) -> None:
+    """Normalised, it is clipped as any large one; as it is, it would become infinite."""
+    config = dataclasses.replace(small_config(seeds=1), normalize_obs=normalised)
+    policy = policies_of(small_run(config))[0]
+    if normalised:
+        assert np.isfinite(policy.act(np.full(3, 1e39))).all()
+    else:
+        with pytest.raises(ValueError, match="an observation is NaN or infinite"):
+            policy.act(np.full(3, 1e39))
 
 
 def test_files_of_another_origin(tmp_path: Path) -> None:

@@ -15,12 +15,11 @@ from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.rows import of as of
+from inbounds.book.report.ways_to_act import BOUNDED
 from inbounds.book.report.words import HEADS
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
-
-NAMES = {"beta": "Beta", "logit-normal": "logit-normal"}
 
 
 def sign(row: Evidence) -> int:
@@ -231,7 +230,7 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
     lent = [row for row in rows if row.as_it_comes]
-    if names := sorted({f"{row.robot}, {NAMES[row.law]} ({row.algorithm.upper()})" for row in lent}):
+    if names := sorted({f"{row.robot}, {BOUNDED[row.law]} ({row.algorithm.upper()})" for row in lent}):
         said.append(f"With its usual start, somewhat louder than 0.4: {'; '.join(names)}.")
     return " ".join(said)
 

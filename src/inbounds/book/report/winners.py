@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import NAMES, in_brackets, of, place_of, sign, too_small
+from inbounds.book.report.answers import in_brackets, of, place_of, sign, too_small
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
+from inbounds.book.report.ways_to_act import BOUNDED
 from inbounds.study.grid import ROBOTS
 
 ALGORITHMS = ("ppo", "trpo")
@@ -40,12 +41,12 @@ def field(rows: Sequence[Evidence]) -> str:
     told = []
     for word, way in (("above", 1), ("below", -1)):
         found = [row for row in rows if signs[row.law] == way]
-        told += [f"{NAMES[row.law]} {word} ({grade(row)})" for row in found]
+        told += [f"{BOUNDED[row.law]} {word} ({grade(row)})" for row in found]
     for word in ("too small to matter, with fresh seeds", "no difference found"):
-        alike = [NAMES[row.law] for row in rows if grade(row) == word]
+        alike = [BOUNDED[row.law] for row in rows if grade(row) == word]
         if alike:
             told.append(word if len(alike) == len(rows) else f"{' and '.join(alike)}: {word}")
-    told += [f"{NAMES[law]} not run" for law in LAWS if law not in signs]
+    told += [f"{BOUNDED[law]} not run" for law in LAWS if law not in signs]
     return "; ".join(told)
 
 
@@ -90,7 +91,7 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
         'Under PPO the Beta ends above the clipped Gaussian on 4 of 6 robots'
     """
     here = of(rows, law=law, algorithm=algorithm, endpoint="final")
-    name = NAMES[law]
+    name = BOUNDED[law]
     first = f"Under {algorithm.upper()} the {name} ends {as_they_come}."
     if not here:
         return f"{first} From an equally quiet start the two were not compared yet."

@@ -167,15 +167,14 @@ class TrainedPolicy:
                 f"observations must have the shape [{self._network.sizes[0]}] or [B, {self._network.sizes[0]}], "
                 f"got {list(obs.shape)}"
             )
-        with np.errstate(over="ignore"):  # said below
-            finite = np.isfinite(obs.astype(self._dtype)).all()
-        if not finite:
+        batch = np.atleast_2d(obs)  # [B, O]
+        with np.errstate(over="ignore", invalid="ignore"):  # said below
+            seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
+        if not (np.isfinite(obs).all() and np.isfinite(seen).all()):
             raise ValueError(
                 "an observation is NaN or infinite, and there is no action for that: look at the sensor, or at the "
                 "environment, that it came from"
             )
-        batch = np.atleast_2d(obs)  # [B, O]
-        seen = batch.astype(self._dtype) if self._normalizer is None else self._normalizer(batch)
         outputs = self._network.act(seen)  # the weights of one seed serve every row
         return outputs, (*obs.shape[:-1], len(self.low))
 
