@@ -19,6 +19,7 @@ from rich.console import Console
 from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study, store
+from inbounds.study.grid import select
 from inbounds.study.running import many_cells
 from inbounds.study.running.attempts import RETRIES, CellReport
 from inbounds.study.running.cell_lock import CellLock, read_claim
@@ -374,9 +375,9 @@ def test_a_cell_that_may_not_be_read_is_no_damaged_one(
     for read in (store.read_cell, store.read_metadata):
         with pytest.raises(PermissionError):
             read("a.parquet")
-    (tmp_path / "cells").mkdir()
-    (tmp_path / "cells" / "standard-hopper-ppo-beta.parquet").write_bytes(b"")
-    assert study(["report", "--results", str(tmp_path), "--out", str(tmp_path / "report.html")]) == 1
+    folder, (cell,) = folder_in(tmp_path), select(["standard-hopper-ppo-beta"])
+    folder.publish(dict.fromkeys(folder.files(cell), b""))  # nothing but reading shows what is in them
+    assert study(["report", "--results", str(folder.results), "--out", str(tmp_path / "report.html")]) == 1
     said = capsys.readouterr().err
     assert "Permission denied: 'a.parquet': change its permissions" in said
 
