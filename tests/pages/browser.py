@@ -15,7 +15,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 HTML = Path(__file__).resolve().parents[2] / os.environ.get("INBOUNDS_HTML", "_build/html")
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
@@ -119,6 +119,27 @@ def chromium() -> Iterator[Browser]:
             yield browser
         finally:
             browser.close()
+
+
+def new_window(browser: Browser) -> Page:
+    """A page that is lent to one reader after the other: a new one, with its process, takes longer than the book's."""
+    context = browser.new_context(viewport=DESKTOP)
+    context.set_default_timeout(20_000)
+    return context.new_page()
+
+
+@contextmanager
+def lent(window: Page) -> Iterator[Page]:
+    """Lend a page to a reader, who leaves nothing kept, routed or set; listeners are the reader's to remove."""
+    try:
+        yield window
+    finally:
+        window.unroute_all(behavior="ignoreErrors")
+        window.evaluate("location.protocol === 'about:' || (localStorage.clear(), sessionStorage.clear())")
+        window.context.clear_cookies()
+        window.goto("about:blank")
+        window.set_viewport_size(DESKTOP)
+        window.emulate_media(media="null", color_scheme="null", reduced_motion="null", forced_colors="null")
 
 
 def choose_theme(theme: str) -> str:

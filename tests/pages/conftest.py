@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext
+from playwright.sync_api import Browser, BrowserContext, Page
 from xdist.scheduler import LoadScopeScheduling
 
 from tests.pages import browser as book
@@ -59,6 +59,26 @@ def browser() -> Iterator[Browser]:
         pytest.fail(str(error), pytrace=False)
     with book.chromium() as running:
         yield running
+
+
+@pytest.fixture(scope="session")
+def _window(browser: Browser) -> Page:
+    return book.new_window(browser)
+
+
+@pytest.fixture(scope="session")
+def window(browser: Browser) -> Page:
+    """For fixtures that keep a page open through a module: `book.lent(window)` gives it to one of them."""
+    window = book.new_window(browser)
+    window.add_init_script(book.SHIFT)
+    return window
+
+
+@pytest.fixture
+def page(_window: Page) -> Iterator[Page]:
+    """An empty page for a new reader; who needs several, or scripts that run first, takes a `context`."""
+    with book.lent(_window) as page:
+        yield page
 
 
 @pytest.fixture

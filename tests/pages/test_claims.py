@@ -14,13 +14,12 @@ LISTS = ".inbounds-claims"
 VERDICTS = "nodes => nodes.filter((node) => node.checkVisibility()).map((node) => node.dataset.verdict)"
 
 
-def opened(context: BrowserContext, url: str) -> tuple[Page, Locator]:
-    page = context.new_page()
+def opened(page: Page, url: str) -> Locator:
     page.goto(url)
     page.evaluate(book.AT_REST)
     first = page.locator(LISTS).first
     page.wait_for_selector(f"{LISTS}[data-state=live]")
-    return page, first
+    return first
 
 
 def shown(claims: Locator) -> list[str]:
@@ -35,7 +34,7 @@ def button(claims: Locator, verdict: str) -> Locator:
 @pytest.mark.parametrize("scheme", ["http", "file"])
 def test_buttons_choose_by_verdict(context: BrowserContext, address: str, scheme: str) -> None:
     start = address if scheme == "http" else f"{book.HTML.as_uri()}/"
-    _, claims = opened(context, start + NAME)
+    claims = opened(context.new_page(), start + NAME)
     everything = shown(claims)
     counts = Counter(everything)
     assert len(everything) > FEW
@@ -62,8 +61,8 @@ def test_buttons_choose_by_verdict(context: BrowserContext, address: str, scheme
     assert shown(claims) == everything
 
 
-def test_the_menu_chooses_by_subject(context: BrowserContext, address: str) -> None:
-    _, claims = opened(context, address + NAME)
+def test_the_menu_chooses_by_subject(page: Page, address: str) -> None:
+    claims = opened(page, address + NAME)
     everything = len(shown(claims))
     menu = claims.locator("select")
     subjects = menu.locator("option").all_inner_texts()[1:]
@@ -82,8 +81,8 @@ def test_the_menu_chooses_by_subject(context: BrowserContext, address: str) -> N
     assert total == everything
 
 
-def test_a_choice_that_nothing_answers_to_has_a_way_out(context: BrowserContext, address: str) -> None:
-    _, claims = opened(context, address + NAME)
+def test_a_choice_that_nothing_answers_to_has_a_way_out(page: Page, address: str) -> None:
+    claims = opened(page, address + NAME)
     everything = shown(claims)
     way_out = claims.get_by_role("button", name="Show all")
     assert not way_out.is_visible()
@@ -101,8 +100,8 @@ def test_a_choice_that_nothing_answers_to_has_a_way_out(context: BrowserContext,
     assert not way_out.is_visible()
 
 
-def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) -> None:
-    page, claims = opened(context, address + NAME)
+def test_answers_the_keyboard_and_speaks(page: Page, address: str) -> None:
+    claims = opened(page, address + NAME)
     assert claims.get_by_role("status").get_attribute("aria-live") == "polite"
     button(claims, "").focus()
     stops = []
@@ -123,8 +122,8 @@ def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) 
     assert line.locator("blockquote").is_visible()
 
 
-def test_a_link_to_a_claim_opens_it(context: BrowserContext, address: str) -> None:
-    page, claims = opened(context, address + NAME)
+def test_a_link_to_a_claim_opens_it(page: Page, address: str) -> None:
+    claims = opened(page, address + NAME)
     button(claims, "supported").click()
     hidden = claims.locator('details[data-verdict="undecided"]').last
     name = hidden.get_attribute("id")
@@ -161,7 +160,8 @@ def test_fits_a_phone_and_says_each_verdict_in_a_word(
     context: BrowserContext, address: str, theme: str
 ) -> None:
     context.add_init_script(book.choose_theme(theme))
-    page, claims = opened(context, address + NAME)
+    page = context.new_page()
+    claims = opened(page, address + NAME)
     page.set_viewport_size(book.PHONE)
     right = claims.evaluate(
         "node => Math.max(...[...node.querySelectorAll('*')].map((each) => each.getBoundingClientRect().right))"

@@ -1,11 +1,12 @@
 """What must hold on every page of the built book."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 from urllib.parse import unquote, urldefrag, urljoin, urlsplit
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response
+from playwright.sync_api import Browser, ConsoleMessage, Error, Page, Request, Response
 
 from tests.pages import browser as book
 from tests.pages.test_accessibility import AXE, THIN_OUT, serious
@@ -36,28 +37,46 @@ class Visit:
     def on_failure(self, request: Request) -> None:
         self.bad_responses.append(f"{request.failure} {request.url}")
 
+    def on_exception(self, error: Error) -> None:
+        self.complaints.append(f"exception: {error}")
+
     def on_console(self, message: ConsoleMessage) -> None:
         if message.type in ("error", "warning", "assert"):
             self.complaints.append(f"{message.type}: {message.text}")
 
 
 @pytest.fixture(scope="module", params=PAGES)
-def visit(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Visit]:
-    """The page, opened once and read by all tests of this file."""
-    context = browser.new_context(viewport=book.DESKTOP)
-    page = context.new_page()
-    visit = Visit(request.param, address, page)
-    page.on("request", visit.on_request)
-    page.on("response", visit.on_response)
-    page.on("requestfailed", visit.on_failure)
-    page.on("console", visit.on_console)
-    page.on("pageerror", lambda error: visit.complaints.append(f"exception: {error}"))
-    page.add_init_script(book.SHIFT)
-    page.goto(address + request.param, wait_until="networkidle")
-    page.evaluate(book.AT_REST)
-    visit.shift = page.evaluate("window.shift")
-    yield visit
-    context.close()
+def visit(request: pytest.FixtureRequest, window: Page, address: str) -> Iterator[Visit]:
+    """The page, opened once and read by all tests of this file; nothing of it has been loaded before."""
+    with book.lent(window) as page:
+        visit = Visit(request.param, address, page)
+        listeners: dict[Any, Callable[[Any], None]] = {
+            "request": visit.on_request,
+            "response": visit.on_response,
+            "requestfailed": visit.on_failure,
+            "console": visit.on_console,
+            "pageerror": visit.on_exception,
+        }
+        for event, listener in listeners.items():
+            page.on(event, listener)
+        cache = page.context.new_cdp_session(page)
+        cache.send("Network.enable")
+        cache.send("Network.setCacheDisabled", {"cacheDisabled": True})
+        page.goto(address + request.param, wait_until="networkidle")
+        page.evaluate(book.AT_REST)
+        visit.shift = page.evaluate("window.shift")
+        yield visit
+        for event, listener in listeners.items():
+            page.remove_listener(event, listener)
+        cache.detach()
+
+
+@pytest.fixture(scope="module", params=["desktop", "phone"])
+def width(request: pytest.FixtureRequest, visit: Visit) -> str:
+    """Of the page, which is laid out anew once for all tests of a width."""
+    visit.page.set_viewport_size(book.DESKTOP if request.param == "desktop" else book.PHONE)
+    visit.page.evaluate(book.AT_REST)
+    return str(request.param)
 
 
 def test_the_book_is_built() -> None:
@@ -137,11 +156,9 @@ def test_no_formula_in_a_line_of_text_scrolls(visit: Visit) -> None:
     assert visit.page.eval_on_selector_all("article span.math", scrolling) == []
 
 
-@pytest.mark.parametrize("width", ["desktop", "phone"])
-def test_formulas_in_text_are_not_cut_off(visit: Visit, width: str) -> None:
+@pytest.mark.usefixtures("width")
+def test_formulas_in_text_are_not_cut_off(visit: Visit) -> None:
     """Nothing but the page's own column bounds them, and they fit in it."""
-    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
-    visit.page.evaluate(book.AT_REST)
     cut = """nodes => nodes.filter((formula) => {
       let column = formula.parentElement;
       while (getComputedStyle(column).display.startsWith('inline')) column = column.parentElement;
@@ -162,10 +179,8 @@ def at_rest(visit: Visit, selector: str, script: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("width", ["desktop", "phone"])
-def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit, width: str) -> None:
-    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
-    visit.page.evaluate(book.AT_REST)
+@pytest.mark.usefixtures("width")
+def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit) -> None:
     unnamed = """nodes => nodes.filter((node) => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1
         && /auto|scroll/.test(getComputedStyle(node).overflowX))
       .filter((node) => node.tabIndex !== 0 || !(node.caption?.textContent ?? node.ariaLabel)?.trim())
@@ -174,9 +189,9 @@ def test_what_scrolls_is_reached_by_keyboard_and_has_a_name(visit: Visit, width:
     assert at_rest(visit, tables, unnamed) == []
 
 
+@pytest.mark.parametrize("width", ["desktop"], indirect=True)
+@pytest.mark.usefixtures("width")
 def test_only_controls_and_what_scrolls_are_tab_stops(visit: Visit) -> None:
-    visit.page.set_viewport_size(book.DESKTOP)
-    visit.page.evaluate(book.AT_REST)
     others = """nodes => nodes.filter((node) => node.tabIndex >= 0 && node.checkVisibility()
         && !node.matches('a, button, input, select, textarea, summary, video, [role=slider], [role=button]')
         && node.scrollWidth <= node.clientWidth && node.scrollHeight <= node.clientHeight)
@@ -223,9 +238,8 @@ def test_videos_wait_for_the_reader(visit: Visit) -> None:
     assert visit.page.eval_on_selector_all("video", wrong) == []
 
 
-@pytest.mark.parametrize("width", ["desktop", "phone"])
-def test_one_search_box(visit: Visit, width: str) -> None:
-    visit.page.set_viewport_size(book.DESKTOP if width == "desktop" else book.PHONE)
+@pytest.mark.usefixtures("width")
+def test_one_search_box(visit: Visit) -> None:
     fields = visit.page.locator("input[type=search]:visible").count()
     buttons = visit.page.locator(".search-button__button:visible").count()
     if visit.name == "search.html":  # the page of results has its own field
@@ -234,9 +248,9 @@ def test_one_search_box(visit: Visit, width: str) -> None:
         assert fields + buttons == 1
 
 
+@pytest.mark.parametrize("width", ["phone"], indirect=True)
+@pytest.mark.usefixtures("width")
 def test_phone_does_not_scroll_sideways(visit: Visit) -> None:
-    visit.page.set_viewport_size(book.PHONE)
-    visit.page.evaluate(book.AT_REST)
     too_wide = """() => {
       const limit = document.documentElement.clientWidth;
       const scrolls = (node) => node && (getComputedStyle(node).overflowX !== 'visible' || scrolls(node.parentElement));

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 import torch
-from playwright.sync_api import Browser, BrowserContext, Locator, Page
+from playwright.sync_api import BrowserContext, Locator, Page
 
 from inbounds.book.explorables.bounded_densities import bounded_densities
 from inbounds.book.explorables.frame import javascript_files
@@ -43,21 +43,18 @@ CONTRAST = """node => {
 }"""
 
 
-def open_page(context: BrowserContext, url: str) -> Page:
+def open_page(page: Page, url: str) -> Page:
     """The page, once its explorables have started."""
-    page = context.new_page()
     page.goto(url)
     page.evaluate(book.AT_REST)
     return page
 
 
 @pytest.fixture(scope="module", params=PAGES)
-def opened(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Page]:
+def opened(request: pytest.FixtureRequest, window: Page, address: str) -> Iterator[Page]:
     """A page that is opened once, for all tests that leave it usable."""
-    context = browser.new_context(viewport=book.DESKTOP)
-    context.set_default_timeout(20_000)
-    yield open_page(context, address + request.param)
-    context.close()
+    with book.lent(window) as page:
+        yield open_page(page, address + request.param)
 
 
 def explorables(page: Page) -> list[Locator]:
@@ -144,8 +141,7 @@ def test_follows_the_theme(opened: Page) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_fits_a_phone(context: BrowserContext, address: str, name: str) -> None:
-    page = context.new_page()
+def test_fits_a_phone(page: Page, address: str, name: str) -> None:
     page.set_viewport_size(book.PHONE)
     page.goto(address + name)
     page.evaluate(book.AT_REST)
@@ -191,12 +187,12 @@ def test_prints_the_figure(opened: Page) -> None:
         assert not explorable.locator(".inbounds-live").is_visible()
 
 
-def test_bounded_densities_shows_the_package_s_numbers(context: BrowserContext, address: str) -> None:
+def test_bounded_densities_shows_the_package_s_numbers(page: Page, address: str) -> None:
     """From the slider in the browser to the digits in the table, against the Python package."""
     names = book.pages('data-model="bounded-densities"')
     assert names
     for name in names:
-        page = open_page(context, address + name)
+        page = open_page(page, address + name)
         for explorable in page.locator("[data-model=bounded-densities]").all():
             mu, log_sigma = explorable.locator("[role=slider]").all()
             for handle, key, times in ((mu, "ArrowLeft", 13), (log_sigma, "ArrowRight", 12)):

@@ -2,7 +2,7 @@
 
 import pytest
 from bs4 import BeautifulSoup, SoupStrainer, Tag
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import Page
 
 from tests.pages import browser as book
 
@@ -23,11 +23,10 @@ COPIED = """() => {
 }"""
 
 
-def test_copied_formulas_are_tex(context: BrowserContext, address: str) -> None:
+def test_copied_formulas_are_tex(page: Page, address: str) -> None:
     names = book.pages("data-tex=")
     if not names:
         pytest.skip("the book was built where npm could not be reached: MathJax has a menu of its own")
-    page = context.new_page()
     page.goto(address + names[0], wait_until="load")
     formula = page.locator("article p > span.math").first
     tex = formula.get_attribute("data-tex")

@@ -1,7 +1,7 @@
 """The front page moves, says who wins and where that is shown, and leads four kinds of readers on."""
 
 import pytest
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import Page
 
 FRONT = "notebooks/front_page.html"
 FILMS = "[...document.querySelectorAll('.inbounds-loop video')]"
@@ -17,9 +17,8 @@ CARDS = {
 
 
 @pytest.fixture
-def front(context: BrowserContext, address: str) -> Page:
+def front(page: Page, address: str) -> Page:
     """The front page, its films in view."""
-    page = context.new_page()
     page.goto(address + FRONT)
     page.locator(".inbounds-loop").scroll_into_view_if_needed()
     return page
@@ -72,8 +71,7 @@ def test_the_dark_band_is_there_with_the_controls_only(front: Page) -> None:
     front.wait_for_function(f"{BAND} !== '{none}'")
 
 
-def test_who_wants_less_motion_sees_them_still(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_who_wants_less_motion_sees_them_still(page: Page, address: str) -> None:
     page.emulate_media(reduced_motion="reduce")
     page.goto(address + FRONT)
     page.locator(".inbounds-loop").scroll_into_view_if_needed()

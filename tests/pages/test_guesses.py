@@ -38,9 +38,8 @@ def test_the_core_chapters_ask() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["http", "file"])
-def test_guesses_are_scored_and_remembered(context: BrowserContext, address: str, scheme: str) -> None:
+def test_guesses_are_scored_and_remembered(page: Page, address: str, scheme: str) -> None:
     start = address if scheme == "http" else f"{book.HTML.as_uri()}/"
-    page = context.new_page()
     page.goto(start + CHOICES[0])
     first = answered(page, right=True)
     results = page.locator(".guess-result")
@@ -65,8 +64,7 @@ def test_guesses_are_scored_and_remembered(context: BrowserContext, address: str
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_every_box_can_be_answered_right_and_wrong(context: BrowserContext, address: str, name: str) -> None:
-    page = context.new_page()
+def test_every_box_can_be_answered_right_and_wrong(page: Page, address: str, name: str) -> None:
     page.goto(address + name)
     page.locator(".guess-check").first.click()
     assert "No guess yet." in page.locator(".guess-result").all_inner_texts()
@@ -90,16 +88,14 @@ def test_a_box_that_another_page_has_checked_since_is_checked(context: BrowserCo
     )
 
 
-def test_who_answers_by_the_keyboard_stays_at_the_box(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_who_answers_by_the_keyboard_stays_at_the_box(page: Page, address: str) -> None:
     page.goto(address + NUMBERS[0])
     page.evaluate(ANSWER, True)
     page.locator(".inbounds-guess input[type=number]").first.press("Enter")
     assert page.evaluate("document.activeElement.textContent") == "Guess again"
 
 
-def test_copying_the_page_leaves_a_choice_as_it_is(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_copying_the_page_leaves_a_choice_as_it_is(page: Page, address: str) -> None:
     page.goto(address + CHOICES[0])
     choice = page.locator(".predict input[type=radio]").first
     choice.check()
@@ -115,8 +111,7 @@ def test_copying_the_page_leaves_a_choice_as_it_is(context: BrowserContext, addr
     assert choice.is_checked()
 
 
-def test_a_wrong_choice_is_told_why(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_a_wrong_choice_is_told_why(page: Page, address: str) -> None:
     page.goto(address + next(name for name in CHOICES if "boundary_effect" in name))
     answered(page, right=False)
     told = page.locator(".guess-result").first
@@ -124,9 +119,8 @@ def test_a_wrong_choice_is_told_why(context: BrowserContext, address: str) -> No
     assert len(told.inner_text()) > len(told.locator("strong").inner_text()) + 20
 
 
-def test_a_kept_guess_is_scored_by_the_truth_of_today(context: BrowserContext, address: str) -> None:
+def test_a_kept_guess_is_scored_by_the_truth_of_today(page: Page, address: str) -> None:
     """Numbers of the study change as cells arrive; what is garbled is no guess, and keeps no box from working."""
-    page = context.new_page()
     page.goto(address + NUMBERS[0])
     count = answered(page, right=True)
     page.evaluate("""() => {

@@ -38,8 +38,7 @@ def stops(page: Page) -> list[dict[str, object]]:
     raise AssertionError(f"more than {MOST_STOPS} stops")
 
 
-def test_tab_leads_through_links_and_controls_alone(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_tab_leads_through_links_and_controls_alone(page: Page, address: str) -> None:
     page.goto(address + with_most_formulas(), wait_until="networkidle")
     page.evaluate(book.AT_REST)
     assert page.locator("article span.math mjx-container").count() > 100

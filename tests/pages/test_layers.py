@@ -88,8 +88,7 @@ def test_without_scripts_everything_is_open(browser: Browser, address: str) -> N
     context.close()
 
 
-def test_paper_has_no_folds(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_paper_has_no_folds(page: Page, address: str) -> None:
     page.goto(address + PAGES[0])
     folded = page.locator("article details:not([open])")
     before = folded.count()

@@ -1,7 +1,7 @@
 """The built book at 360 pixels: six robots stand in one column, and no punctuation stands on a line alone."""
 
 import pytest
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import Page
 
 from tests.pages import browser as book
 
@@ -41,8 +41,7 @@ SEVERAL = [
 ]
 
 
-def on_a_phone(context: BrowserContext, url: str) -> Page:
-    page = context.new_page()
+def on_a_phone(page: Page, url: str) -> Page:
     page.set_viewport_size(book.PHONE)
     page.goto(url)
     page.evaluate(book.AT_REST)
@@ -58,8 +57,8 @@ NARROW = "source => new URL(source.getAttribute('srcset'), location).href"
 
 
 @pytest.mark.parametrize("name", ["notebooks/what_happened.html", "notebooks/figures_of_the_thesis.html"])
-def test_six_robots_stand_in_one_column_that_fits(context: BrowserContext, address: str, name: str) -> None:
-    page = on_a_phone(context, address + name)
+def test_six_robots_stand_in_one_column_that_fits(page: Page, address: str, name: str) -> None:
+    page = on_a_phone(page, address + name)
     pictures = page.locator(".inbounds-study picture")
     assert pictures.count() >= 3
     for picture in pictures.all():
@@ -82,8 +81,8 @@ def test_six_robots_stand_in_one_column_that_fits(context: BrowserContext, addre
 
 
 @pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
-def test_every_figure_of_the_study_fits(context: BrowserContext, address: str, name: str) -> None:
-    figures = on_a_phone(context, address + name).locator(".inbounds-study figure:has(img)")
+def test_every_figure_of_the_study_fits(page: Page, address: str, name: str) -> None:
+    figures = on_a_phone(page, address + name).locator(".inbounds-study figure:has(img)")
     assert figures.count() >= 6
     for figure in figures.all():
         assert figure.locator("picture source").count() == 1
@@ -99,12 +98,12 @@ FAR = """tables => tables.map((table) => {
 
 
 @pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
-def test_the_first_result_stands_beside_the_name(context: BrowserContext, address: str, name: str) -> None:
-    tables = on_a_phone(context, address + name).locator(".inbounds-study .table table")
+def test_the_first_result_stands_beside_the_name(page: Page, address: str, name: str) -> None:
+    tables = on_a_phone(page, address + name).locator(".inbounds-study .table table")
     assert tables.count() >= 6
     assert tables.evaluate_all(FAR) == []
 
 
 @pytest.mark.parametrize("name", SEVERAL)
-def test_no_punctuation_stands_alone_on_a_line(context: BrowserContext, address: str, name: str) -> None:
-    assert on_a_phone(context, address + name).evaluate(LONELY) == []
+def test_no_punctuation_stands_alone_on_a_line(page: Page, address: str, name: str) -> None:
+    assert on_a_phone(page, address + name).evaluate(LONELY) == []

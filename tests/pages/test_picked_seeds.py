@@ -17,16 +17,15 @@ LIVE = ".inbounds-picked-seeds[data-state=live] .seeds-plot svg"
 SAID = ".seeds-said"
 
 
-def opened(context: BrowserContext, address: str) -> tuple[Page, Locator]:
-    page = context.new_page()
+def opened(page: Page, address: str) -> Locator:
     page.goto(address + NAME)
     page.evaluate(book.AT_REST)
     page.wait_for_selector(LIVE)
-    return page, page.locator(".inbounds-picked-seeds")
+    return page.locator(".inbounds-picked-seeds")
 
 
-def test_says_what_python_says_of_the_ticked_seeds(context: BrowserContext, address: str) -> None:
-    _, seeds = opened(context, address)
+def test_says_what_python_says_of_the_ticked_seeds(page: Page, address: str) -> None:
+    seeds = opened(page, address)
     row, sides = next(
         (row, sides)
         for row, sides in pairs(study_pages.shipped())
@@ -56,8 +55,8 @@ def test_says_what_python_says_of_the_ticked_seeds(context: BrowserContext, addr
             assert cell == ("under 0.1\u202f%" if 0 < share < 0.001 else told)
 
 
-def test_every_button_and_choice_changes_what_is_said(context: BrowserContext, address: str) -> None:
-    _, seeds = opened(context, address)
+def test_every_button_and_choice_changes_what_is_said(page: Page, address: str) -> None:
+    seeds = opened(page, address)
     said = seeds.locator(SAID)
     for name in ("Best for the first", "Best for the second", "All", "Three at random"):
         before = said.inner_text()
@@ -73,8 +72,8 @@ def test_every_button_and_choice_changes_what_is_said(context: BrowserContext, a
     assert not seeds.locator("table").is_visible()
 
 
-def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) -> None:
-    page, seeds = opened(context, address)
+def test_answers_the_keyboard_and_speaks(page: Page, address: str) -> None:
+    seeds = opened(page, address)
     said = seeds.locator(SAID)
     assert said.get_attribute("aria-live") == "polite"
     seeds.locator("select[name=robot]").focus()

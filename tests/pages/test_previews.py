@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import Page
 
 from tests.pages import browser as book
 
@@ -15,14 +15,13 @@ APART = """() => {
 }"""
 
 
-def opened(context: BrowserContext, start: str, kind: str) -> Page:
+def opened(page: Page, start: str, kind: str) -> Page:
     """A page with a link of this kind, and the link in sight."""
     part = KINDS[kind]
     written = re.compile(rf'<a class="reference internal" href="[^"]*{part}')
     names = [
         name for name in book.pages(part) if written.search((book.HTML / name).read_text(encoding="utf-8"))
     ]
-    page = context.new_page()
     for name in names:
         page.goto(start + name)
         links = page.locator(f'article a.reference.internal[href*="{part}"]:visible')
@@ -35,8 +34,8 @@ def opened(context: BrowserContext, start: str, kind: str) -> Page:
 
 @pytest.mark.parametrize("scheme", ["http", "file"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_pointer_that_rests_sees_it(context: BrowserContext, address: str, scheme: str, kind: str) -> None:
-    page = opened(context, address if scheme == "http" else f"{book.HTML.as_uri()}/", kind)
+def test_a_pointer_that_rests_sees_it(page: Page, address: str, scheme: str, kind: str) -> None:
+    opened(page, address if scheme == "http" else f"{book.HTML.as_uri()}/", kind)
     assert not page.locator("script[src$='.html.js']").count()
     page.locator("[data-tried]").hover()
     preview = page.locator("#inbounds-preview")
@@ -51,8 +50,8 @@ def test_a_pointer_that_rests_sees_it(context: BrowserContext, address: str, sch
     assert page.locator("[aria-describedby=inbounds-preview]").count() == 0
 
 
-def test_a_focused_link_has_it_too(context: BrowserContext, address: str) -> None:
-    page = opened(context, address, "statement")
+def test_a_focused_link_has_it_too(page: Page, address: str) -> None:
+    page = opened(page, address, "statement")
     page.keyboard.press("Tab")
     page.locator("[data-tried]").focus()
     page.locator("#inbounds-preview[role=tooltip]").wait_for()

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import Page
 
 USED = {
     "button",
@@ -20,13 +20,12 @@ SHOWN = {"image", "img", "table"}  # a figure is told by what is in it: a pictur
 ICONS = range(0xE000, 0xF900)  # where icon fonts keep their pictures
 
 
-def spoken(context: BrowserContext, url: str) -> list[tuple[str, str, dict[str, Any]]]:
+def spoken(page: Page, url: str) -> list[tuple[str, str, dict[str, Any]]]:
     """Role, name and properties of what a page tells, in its order."""
-    page = context.new_page()
     page.goto(url)
     page.wait_for_load_state("load")
     page.wait_for_timeout(500)
-    nodes = context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
+    nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
     return [
         (
             node["role"]["value"],
@@ -39,7 +38,7 @@ def spoken(context: BrowserContext, url: str) -> list[tuple[str, str, dict[str, 
 
 
 @pytest.mark.parametrize(
-    "page",
+    "name",
     [
         "notebooks/front_page.html",
         "notebooks/greedy_action.html",
@@ -47,8 +46,8 @@ def spoken(context: BrowserContext, url: str) -> list[tuple[str, str, dict[str, 
         "notebooks/live_robot.html",
     ],
 )
-def test_what_is_used_or_shown_has_a_name_in_words(context: BrowserContext, address: str, page: str) -> None:
-    told = spoken(context, address + page)
+def test_what_is_used_or_shown_has_a_name_in_words(page: Page, address: str, name: str) -> None:
+    told = spoken(page, address + name)
     assert len(told) > 100
     nameless = [role for role, name, _ in told if role in USED | SHOWN and not name.strip()]
     assert nameless == []
@@ -59,13 +58,13 @@ def test_what_is_used_or_shown_has_a_name_in_words(context: BrowserContext, addr
     assert [properties for _, _, properties in told if properties.get("live") == "assertive"] == []
 
 
-def test_a_formula_is_read_part_by_part(context: BrowserContext, address: str) -> None:
-    roles = [role for role, _, _ in spoken(context, address + "notebooks/greedy_action.html")]
+def test_a_formula_is_read_part_by_part(page: Page, address: str) -> None:
+    roles = [role for role, _, _ in spoken(page, address + "notebooks/greedy_action.html")]
     assert roles.count("MathMLMath") > 50
     assert roles.count("MathMLIdentifier") > roles.count("MathMLMath")
 
 
-def test_a_guess_is_a_group_with_its_question_as_name(context: BrowserContext, address: str) -> None:
-    told = spoken(context, address + "notebooks/greedy_action.html")
+def test_a_guess_is_a_group_with_its_question_as_name(page: Page, address: str) -> None:
+    told = spoken(page, address + "notebooks/greedy_action.html")
     assert [name for role, name, _ in told if role == "group" and name.startswith("1. ")]
     assert {properties["live"] for role, _, properties in told if role == "status"} == {"polite"}

@@ -39,8 +39,7 @@ def ask(page: Page, start: str, query: str) -> None:
 
 
 @pytest.mark.parametrize("query", QUERIES)
-def test_the_right_page_is_first(context: BrowserContext, address: str, query: str) -> None:
-    page = context.new_page()
+def test_the_right_page_is_first(page: Page, address: str, query: str) -> None:
     ask(page, address, query)
     first = page.locator("#search-results li a").first
     assert (first.get_attribute("href") or "").rpartition("/")[2] == f"{QUERIES[query]}.html"
@@ -59,23 +58,20 @@ def test_results_have_passages_and_lead_there(context: BrowserContext, address: 
     assert complaints == []
 
 
-def test_names_of_the_package_are_found(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_names_of_the_package_are_found(page: Page, address: str) -> None:
     ask(page, address, "inbounds.learning.train")
     assert (page.locator("#search-results li a").first.get_attribute("href") or "").startswith(
         "book/api.html#"
     )
 
 
-def test_nothing_found_is_said(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_nothing_found_is_said(page: Page, address: str) -> None:
     ask(page, address, "zeppelin")
     assert "Nothing in the book" in page.locator(".search-summary").inner_text()
     assert page.locator("#search-results li").count() == 0
 
 
-def test_results_are_accessible(context: BrowserContext, address: str) -> None:
-    page = context.new_page()
+def test_results_are_accessible(page: Page, address: str) -> None:
     page.set_viewport_size(book.PHONE)
     ask(page, address, "policy")
     assert page.locator("#search-results li").count() > 1

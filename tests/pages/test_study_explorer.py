@@ -15,18 +15,17 @@ SAID, ROWS = ".explorer-said", ".explorer-row .told"
 CHOICES = {"start": 4, "algorithm": 2, "endpoint": 2, "family": 4, "robot": 6}
 
 
-def opened(context: BrowserContext, address: str, name: str = NAME) -> tuple[Page, Locator]:
-    page = context.new_page()
+def opened(page: Page, address: str, name: str = NAME) -> Locator:
     page.goto(address + name)
     page.evaluate(book.AT_REST)
     explorer = page.locator(".inbounds-study-explorer")
     page.wait_for_selector(".inbounds-study-explorer[data-state=live] .explorer-panels svg")
-    return page, explorer
+    return explorer
 
 
-def test_shows_the_static_page_s_words(context: BrowserContext, address: str) -> None:
+def test_shows_the_static_page_s_words(page: Page, address: str) -> None:
     """From the built book's data through the script to the screen, against Python."""
-    _, explorer = opened(context, address)
+    explorer = opened(page, address)
     rows = as_they_come.compared(study_pages.shipped(), "standard")
     for start, algorithm, endpoint in (("standard", "ppo", "final"), ("standard", "trpo", "area")):
         for value in (start, algorithm, endpoint):
@@ -37,8 +36,8 @@ def test_shows_the_static_page_s_words(context: BrowserContext, address: str) ->
             assert as_they_come.told(as_they_come.of(rows, contrast=contrast, endpoint=endpoint)) in said
 
 
-def test_every_control_changes_what_is_shown(context: BrowserContext, address: str) -> None:
-    _, explorer = opened(context, address)
+def test_every_control_changes_what_is_shown(page: Page, address: str) -> None:
+    explorer = opened(page, address)
     data = json.loads(explorer.locator("script[type='application/json']").inner_text())
     for name, count in CHOICES.items():
         controls = explorer.locator(f"input[name={name}]").all()
@@ -60,8 +59,8 @@ def test_every_control_changes_what_is_shown(context: BrowserContext, address: s
     assert shown <= written
 
 
-def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) -> None:
-    page, explorer = opened(context, address)
+def test_answers_the_keyboard_and_speaks(page: Page, address: str) -> None:
+    explorer = opened(page, address)
     said = explorer.locator(SAID)
     assert said.get_attribute("aria-live") == "polite"
     explorer.locator("input[value=standard]").focus()
@@ -84,17 +83,17 @@ def test_answers_the_keyboard_and_speaks(context: BrowserContext, address: str) 
         assert svg.get_attribute("aria-hidden") == "true" or len(label) > 30
 
 
-def test_what_is_missing_is_one_strip(context: BrowserContext, address: str) -> None:
-    _, explorer = opened(context, address)
+def test_what_is_missing_is_one_strip(page: Page, address: str) -> None:
+    explorer = opened(page, address)
     assert not explorer.locator(".explorer-missing").is_visible()  # usual starts, PPO: nothing lacks
     explorer.locator("input[value=printed]").check()
     strip = explorer.locator(".explorer-missing").inner_text()
     assert re.match(r"\d+ of \d+ differences are there\. Not finished: .*Ant", strip)
 
 
-def test_chapter_16_moves_between_quiet_as_they_come_and_loud(context: BrowserContext, address: str) -> None:
+def test_chapter_16_moves_between_quiet_as_they_come_and_loud(page: Page, address: str) -> None:
     """It begins with its own robots and policies; each start changes sentence, forest and curves together."""
-    _, explorer = opened(context, address, "notebooks/why.html")
+    explorer = opened(page, address, "notebooks/why.html")
     ticked = explorer.locator("input:checked").evaluate_all("nodes => nodes.map((node) => node.value)")
     assert set(ticked) == {
         "standard",

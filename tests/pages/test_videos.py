@@ -28,14 +28,12 @@ def test_some_page_has_a_video() -> None:
 
 
 @pytest.fixture(scope="module", params=PAGES)
-def opened(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Page]:
+def opened(request: pytest.FixtureRequest, window: Page, address: str) -> Iterator[Page]:
     """A page with films, opened once."""
-    context = browser.new_context(viewport=book.DESKTOP)
-    page = context.new_page()
-    page.emulate_media(reduced_motion="reduce")  # else those of the front page begin by themselves
-    page.goto(address + request.param)
-    yield page
-    context.close()
+    with book.lent(window) as page:
+        page.emulate_media(reduced_motion="reduce")  # else those of the front page begin by themselves
+        page.goto(address + request.param)
+        yield page
 
 
 def test_videos_play(opened: Page) -> None:
