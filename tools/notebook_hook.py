@@ -15,9 +15,9 @@ from pathlib import Path
 
 import nbformat
 
+from inbounds.book.pages.glue import ROLE, glued
+
 ROOT = Path(__file__).resolve().parents[1]
-QUOTED = re.compile(r"\{glue:?\w*\}`(?:([^`:]+\.ipynb)::)?([^`:]+)(?::([^`]*))?`")
-"""The notebook, where it is another one, the name and the format in a glue role of MyST."""
 TRUTH = re.compile(r"^:truth: *(\S+)$", re.M)
 """The name of the number that a guess is compared with (`book/_ext/guesses.py`)."""
 LIGHT = ("text/plain", "application/papermill.record/text/plain")
@@ -70,44 +70,27 @@ def lines_beside_imports(source: str) -> int:
     return len(source.splitlines()) - sum((node.end_lineno or 0) - node.lineno + 1 for node in imports)
 
 
-def glued(notebook: nbformat.NotebookNode) -> dict[str, str]:
-    """Return all values that a notebook glues, as it stores them, by name."""
-    return {
-        output.metadata["scrapbook"]["name"]: "".join(
-            output.data.get(LIGHT[0], output.data.get(LIGHT[1], ""))
-        )
-        for cell in notebook.cells
-        for output in cell.get("outputs", [])
-        if "scrapbook" in output.get("metadata", {})
-    }
-
-
 def glued_twice(notebook: nbformat.NotebookNode) -> list[str]:
     """Return which names are glued more than once: the build warns of it, and its warnings are errors."""
-    names = [
-        output.metadata["scrapbook"]["name"]
-        for cell in notebook.cells
-        for output in cell.get("outputs", [])
-        if "scrapbook" in output.get("metadata", {})
-    ]
-    return [f"glues {name!r} {count} times" for name, count in Counter(names).items() if count > 1]
+    names = Counter(name for name, _ in glued(notebook.cells))
+    return [f"glues {name!r} {count} times" for name, count in names.items() if count > 1]
 
 
 def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:
     """Return what the prose quotes and no cell has glued: the build would fail on it, after a quarter of an hour."""
-    known, found = {"": glued(notebook)}, []
+    known, found = {"": dict(glued(notebook.cells))}, []
     for number, cell in enumerate(notebook.cells):
         for name in TRUTH.findall(cell.source) if cell.cell_type == "markdown" else ():
             if name not in known[""]:
                 found.append(f"cell {number}: has a guess at {name!r}, which no cell glues")
-        for role in QUOTED.finditer(cell.source) if cell.cell_type == "markdown" else ():
+        for role in ROLE.finditer(cell.source) if cell.cell_type == "markdown" else ():
             other, name, how = role[1] or "", role[2], role[3] or ""
             if other and role[3] is None:
                 found.append(
                     f"cell {number}: quotes {name!r} of {other} without the colon that ends it: {name}:"
                 )
             if other not in known:
-                known[other] = glued(nbformat.read(ROOT / "notebooks" / other, 4))
+                known[other] = dict(glued(nbformat.read(ROOT / "notebooks" / other, 4).cells))
             if name not in known[other]:
                 said = f" of {other}" if other else ""
                 found.append(f"cell {number}: quotes {name!r}, which no cell{said} glues")

@@ -26,14 +26,13 @@ from pathlib import Path
 import nbformat
 
 from inbounds.book.pages.contents import contents
+from inbounds.book.pages.glue import ROLE, glued
 from inbounds.cli.classroom.ready import INSTALL
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER = ".handed-out.json"
 """In the students' folder: the digest of each notebook as it was handed out."""
 INSTEAD = "*The solution is in the book.*"
-GLUED = re.compile(r"\{glue:text\}`(?:([^`:]+\.ipynb)::)?([^`:]+)(?::([^`]*))?`")
-"""The notebook, where it is another one, the name and the format of a glued number."""
 SHOWN_LATER = re.compile(r"^```\{glue\}[^\n]*\n```$", re.MULTILINE)
 """A directive that shows above what a later cell makes."""
 
@@ -48,7 +47,7 @@ def student_copy(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         ValueError: the markers of a solution do not pair.
     """
     student = copy.deepcopy(notebook)
-    student.cells, inside, values = [], False, {"": stored_values(notebook)}
+    student.cells, inside, values = [], False, {"": dict(glued(notebook.cells))}
     for cell in copy.deepcopy(notebook.cells):
         if cell.cell_type == "code":
             if inside or "solution" in cell.metadata.get("tags", []):
@@ -102,18 +101,6 @@ def without_solutions(text: str, inside: bool) -> tuple[str, bool]:
     return "\n".join(left).strip("\n"), inside
 
 
-def stored_values(notebook: nbformat.NotebookNode) -> dict[str, str]:
-    """Return what a notebook glues, as its outputs keep it: the `repr` of each value, by name."""
-    return {
-        output.metadata.scrapbook.name: text
-        for cell in notebook.cells
-        for output in cell.get("outputs", [])
-        if "scrapbook" in output.get("metadata", {})
-        for kind, text in output.get("data", {}).items()
-        if kind.endswith("text/plain")
-    }
-
-
 def with_numbers(text: str, values: dict[str, dict[str, str]]) -> str:
     """Put glued numbers in the place of the roles that show them.
 
@@ -128,7 +115,7 @@ def with_numbers(text: str, values: dict[str, dict[str, str]]) -> str:
     def shown(role: re.Match[str]) -> str:
         other, name, how = role[1] or "", role[2], role[3] or ""
         if other not in values:
-            values[other] = stored_values(nbformat.read(ROOT / "notebooks" / other, as_version=4))
+            values[other] = dict(glued(nbformat.read(ROOT / "notebooks" / other, as_version=4).cells))
         if name not in values[other]:
             return role[0]
         try:
@@ -136,7 +123,7 @@ def with_numbers(text: str, values: dict[str, dict[str, str]]) -> str:
         except (SyntaxError, ValueError):  # no literal: shown as it is stored
             return values[other][name]
 
-    return SHOWN_LATER.sub("*A later cell shows this.*", GLUED.sub(shown, text))
+    return SHOWN_LATER.sub("*A later cell shows this.*", ROLE.sub(shown, text))
 
 
 def written(path: Path) -> str:

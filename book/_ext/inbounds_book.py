@@ -38,6 +38,7 @@ from inbounds.book.explorables.frame import javascript_files
 from inbounds.book.explorer.claims import SCRIPT as CLAIMS_SCRIPT
 from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
 from inbounds.book.explorer.picked_seeds import SCRIPTS as SEEDS_SCRIPTS
+from inbounds.book.pages.glue import ROLE
 from inbounds.book.pages.programs import continued
 
 FOLDER = "explorables"
@@ -57,16 +58,14 @@ def use_named_cache(app: Sphinx, config: Config) -> None:
         config.nb_execution_cache_path = os.environ["INBOUNDS_NB_CACHE"]
 
 
-QUOTED = re.compile(r"\{glue:[a-z]*\}`([^`:]+\.ipynb)::")
-
-
 def sources(page: Path) -> set[Path]:
     """Return the notebooks whose numbers a page quotes, and those whose program it continues.
 
     Args:
         page: a notebook, or Markdown.
     """
-    found = {(page.parent / name).resolve() for name in QUOTED.findall(page.read_text(encoding="utf8"))}
+    quoted = ROLE.findall(page.read_text(encoding="utf8"))
+    found = {(page.parent / other).resolve() for other, _, _ in quoted if other}
     earlier = continued(page) if page.suffix == ".ipynb" else None
     while earlier is not None:
         found.add(earlier.resolve())

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from inbounds.book.pages import glue
 from inbounds.book.pages.cells import read_cells
 from inbounds.book.pages.programs import diff
 
@@ -26,7 +27,6 @@ HIDDEN = frozenset({"hide-input", "hide-cell", "remove-input", "remove-cell"})
 STATEMENT = re.compile(r"\{prf:(?:theorem|proposition|lemma|corollary)\}")
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<name>[^\n`]*)\n(?P<body>.*?)^(?P=fence)[ \t]*$", re.M | re.S)
 ROLE = re.compile(r"\{[\w:+-]+\}`([^`]*)`")
-GLUED = re.compile(r"\{glue:\w*\}`(?:[^`:]+::)?([^`:]+)(:[^`]*)?`")
 NUMBER = r"[−-]?\d[\d.,\u202f\s]*%?"
 PAIR = re.compile(rf"{NUMBER}\s*(?:,|;|to|and|–)\s*{NUMBER}")
 ONE = r"\ue000[^\ue000\ue001\[(]*\ue001[^\w\ue000,()\[\]]{0,3}"
@@ -84,7 +84,7 @@ def count(cells: Sequence[dict[str, Any]]) -> Counts:
         (5, 2)
     """
     prose, code = taught(cells)
-    texts = _glued_texts(cells)
+    texts = dict(glue.glued(cells))
     paragraphs = list(_paragraphs(prose))
     fullest = max(paragraphs, key=lambda paragraph: intervals(paragraph, texts), default="")
     return Counts(
@@ -155,7 +155,7 @@ def plain(prose: str) -> str:
     prose = re.sub(
         r"^(?:`{3,}|:{3,})(?:\{[^}]*\})?|^:[\w-]+:.*$|^\([\w-]+\)=$|<!--.*?-->", " ", prose, flags=re.M
     )
-    prose = GLUED.sub(" number ", prose)
+    prose = glue.ROLE.sub(" number ", prose)
     prose = ROLE.sub(lambda role: f" {re.sub(r'<[^>]*>', '', role[1])} ", prose)
     prose = re.sub(r"<[^>]+>", " ", prose)
     return re.sub(r"\]\([^)]*\)", " ", prose)
@@ -172,20 +172,9 @@ def intervals(paragraph: str, texts: dict[str, str] | None = None) -> int:
         >>> intervals("from {glue:text}`low` to {glue:text}`high`, then {glue:text}`b`", {"b": "3 [1, 5]"})
         2
     """
-    shown = GLUED.sub(lambda glue: f"\ue000{(texts or {}).get(glue[1], '')}\ue001", paragraph)
+    shown = glue.ROLE.sub(lambda role: f"\ue000{(texts or {}).get(role[2], '')}\ue001", paragraph)
     inside = sum(len(PAIR.findall(text)) for text in re.findall(r"\ue000([^\ue001]*)\ue001", shown))
     return inside + len(BETWEEN_GLUED.findall(shown))
-
-
-def _glued_texts(cells: Sequence[dict[str, Any]]) -> dict[str, str]:
-    """Return the texts that a notebook glues, by name."""
-    found = {}
-    for cell in cells:
-        for output in cell.get("outputs", []):
-            name = output.get("metadata", {}).get("scrapbook", {}).get("name")
-            for text in output.get("data", {}).values() if name else ():
-                found[name] = "".join(text)
-    return found
 
 
 def _paragraphs(prose: str) -> Iterator[str]:
