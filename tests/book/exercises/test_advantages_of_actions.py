@@ -79,6 +79,23 @@ def test_lambda_return_mistakes(wrong: Callable, words: str) -> None:
     assert words in verdict.message
 
 
+def cut_first(reward, next_value, terminated, truncated, gamma, lam):
+    """Asks for the cut before the end: where a step is both, something follows."""
+    returns, following = np.zeros(len(reward)), next_value[-1]
+    for t in reversed(range(len(reward))):
+        following = next_value[t] if truncated[t] else following
+        after = (1 - lam) * next_value[t] + lam * following
+        following = reward[t] + gamma * after * (truncated[t] or not terminated[t])
+        returns[t] = following
+    return returns
+
+
+def test_an_end_that_is_a_cut_too_is_an_end() -> None:
+    verdict = graders.lambda_returns(cut_first)
+    assert verdict.passed is False
+    assert "a *terminated* step has nothing after it" in verdict.message
+
+
 def growing(batch, critic, gamma=0.99, lam=0.95, *, ends=1.0, cuts=0.0, stop=(1, 1), weight=None, plus=1.0,
             added=False, graph=()):  # fmt: skip
     """The growing program's, with its mistakes on demand."""

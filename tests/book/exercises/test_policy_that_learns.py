@@ -54,6 +54,21 @@ def autograd(latent, loc, log_scale):
 RIGHT = {"rewards_to_go": backwards, "score": autograd}
 
 
+def cut_first(reward, terminated, truncated, next_value, gamma):
+    """Asks for the cut before the end: where a step is both, something follows."""
+    to_go, later = np.zeros(len(reward)), next_value[-1]
+    for t in reversed(range(len(reward))):
+        later = next_value[t] if truncated[t] else 0.0 if terminated[t] else later
+        to_go[t] = later = reward[t] + gamma * later
+    return to_go
+
+
+def test_an_end_that_is_a_cut_too_is_an_end() -> None:
+    verdict = graders.rewards_to_go(cut_first)
+    assert verdict.passed is False
+    assert "after a *terminated* step nothing follows" in verdict.message
+
+
 @pytest.mark.parametrize("name", RIGHT)
 def test_right_answers_pass(name: str) -> None:
     assert getattr(graders, name)(RIGHT[name]).passed is True

@@ -20,6 +20,11 @@ def capped(ratio, advantage, clip_range):
     return torch.where(flat, (1 + clip_range * torch.sign(advantage)) * advantage, ratio * advantage)
 
 
+def capped_in_the_logarithm(ratio, advantage, clip_range):
+    """With corners at e^±ε instead of 1 ± ε."""
+    return torch.minimum(ratio * advantage, ratio.log().clamp(-clip_range, clip_range).exp() * advantage)
+
+
 def right_surrogate(policy, batch, advantage, old_log_prob, clip_range=0.2):
     ratio = torch.exp(policy.log_prob(batch.obs, batch.latent) - old_log_prob)
     return capped(ratio, advantage, clip_range).mean()
@@ -38,6 +43,15 @@ def loss_with(change: str = "") -> Callable[..., Any]:
             "no minimum": clipped * advantage,
             "minimum first": torch.minimum(ratio, clipped) * advantage,
             "no clip": ratio * advantage,
+            "clipped in the logarithm": capped_in_the_logarithm(ratio, advantage, clip_range),
+            "one over": torch.minimum(
+                ratio * advantage, ratio.clamp(1 / (1 + clip_range), 1 + clip_range) * advantage
+            ),
+            "late": torch.where(
+                advantage > 0,
+                ratio * advantage * (ratio < 1 + 1.2 * clip_range),
+                capped(ratio, advantage, clip_range),
+            ),
         }.get(change, capped(ratio, advantage, clip_range))
         gain = gain.sum() if change == "sum" else gain.mean()
         value = critic(batch.obs)[:, None] if change == "broadcast" else critic(batch.obs)
@@ -72,6 +86,9 @@ def test_a_right_loss_passes_every_check() -> None:
         ("minimum first", "knows bad actions", "before"),
         ("no clip", "knows bad actions", "must be left alone"),
         ("clip range", "stops paying", "does not reach the surrogate"),
+        ("clipped in the logarithm", "knows bad actions", "flat at r = 0.8"),
+        ("one over", "knows bad actions", "flat at r = 0.8"),
+        ("late", "stops paying", "flat at r = 1.2"),
         ("broadcast", "teaches the critic", "[B, B]"),
         ("next", "teaches the critic", "not about next_obs"),
         ("values doubled", "teaches the critic", "value_coef"),

@@ -207,7 +207,7 @@ def lambda_returns(function: Callable[..., Any]) -> Judgement:
     def case(ends: dict[int, str], steps: int, gamma: float, lam: float) -> Case:
         reward, next_value = rng.normal(size=(2, steps)) + 1.0
         terminated, truncated = (
-            np.array([ends.get(t) == kind for t in range(steps)]) for kind in ("terminated", "truncated")
+            np.array([kind in ends.get(t, "") for t in range(steps)]) for kind in ("terminated", "truncated")
         )
         arguments = (reward, next_value, terminated, truncated, gamma, lam)
 
@@ -235,6 +235,7 @@ def lambda_returns(function: Callable[..., Any]) -> Judgement:
         case({}, 5, 0.9, 0.8),
         case({1: "truncated", 4: "terminated", 8: "truncated"}, 12, 0.97, 0.95),
         case({3: "truncated"}, 8, 0.9, 1.0),
+        case({2: "terminated, truncated"}, 6, 0.9, 0.8),  # the last step of the clock may also be a fall
     ]
     return judge_cases(function, cases, "right: ends end, cuts do not")
 

@@ -49,6 +49,7 @@ def rewards_to_go(function: Callable[..., Any]) -> Judgement:
         case(6, (2,), (), 0.9),
         case(12, (1, 8), (4,), 0.97),
         case(5, (4,), (), 0.9),
+        case(6, (2,), (2,), 0.9),  # the last step of the clock may also be a fall
     ]
     return judge_cases(function, cases, "right: ends end, cuts do not")
 

@@ -209,19 +209,30 @@ def _knows_bad_actions(function: Loss) -> str | None:
                 f"of the actions that were worse than expected, those with {where}: multiply by Â *before* you take "
                 "the minimum"
             )
-    return None
+    return _turns_at(function, scene.with_advantages(advantage), 1 - EPSILON)
 
 
 def _stops_paying(function: Loss) -> str | None:
     scene = Scene.of(5)
-    ratio = torch.linspace(1.3, 1.7, STEPS, dtype=torch.float64)
-    moved = scene.with_ratios(ratio).with_advantages(scene.advantage.abs() + 0.1)
+    scene = scene.with_advantages(scene.advantage.abs() + 0.1)
+    moved = scene.with_ratios(torch.linspace(1.3, 1.7, STEPS, dtype=torch.float64))
     gradient = moved.gradients(policy_loss(function, moved))[0]
     if gradient.any():
         return "for Â > 0 and r > 1 + ε the surrogate is flat: nothing may push these ratios further up"
-    if moved.gradients(moved.loss(function, clip_range=1.0))[0].any():
+    if not moved.gradients(moved.loss(function, clip_range=1.0))[0].any():
+        return "clip_range does not reach the surrogate: 1 + clip_range was 2, ratios below it were clipped: pass it on"
+    return _turns_at(function, scene, 1 + EPSILON)
+
+
+def _turns_at(function: Loss, scene: Scene, corner: float) -> str | None:
+    """Look at ratios on both sides of a corner: beyond it, for advantages of one sign, nothing may be paid."""
+    ratio = torch.linspace(corner - 0.05, corner + 0.05, STEPS, dtype=torch.float64)
+    moved = scene.with_ratios(ratio)
+    paid = ratio < corner if corner > 1 else ratio > corner
+    wanted = moved.weighted_score(ratio * moved.advantage * paid)
+    if _close(moved.gradients(policy_loss(function, moved))[0], wanted):
         return None
-    return "clip_range does not reach the surrogate: 1 + clip_range was 2, and ratios below 2 were clipped; pass it on"
+    return f"the surrogate must turn flat at r = {corner:g}, where clip_range is {EPSILON}: clamp r to 1 ± clip_range"
 
 
 def _teaches_the_critic(function: Loss) -> str | None:
