@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from inbounds.book.report import answers, study_pages, ways_to_act
-from inbounds.book.report.equal_start import grade, laws, outcomes_of_both
+from inbounds.book.report.equal_start import grade, laws, outcomes_of_both, quiet_starts
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast, change, differences
 from inbounds.study.outcomes import Outcomes
@@ -49,28 +49,46 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert gained.low > 0
     assert f"gains {spoken(gained, 0)} points" in said
     assert f"is {lead(outcomes, 'HalfCheetah')}." in said
+    ppo = answers.of(quiet_starts(outcomes_of_both(outcomes)), algorithm="ppo", endpoint="final")
+    assert [grade(row) for row in ppo if answers.sign(row) > 0] == ["suggested"] * 2
+    assert not [row for row in ppo if answers.sign(row) < 0]
+    assert (
+        f"(suggested). Under PPO a Gaussian that only begins with less noise ends higher on 2 of {len(ppo)}"
+        in said
+    )
 
 
 def test_a_law(outcomes: Outcomes) -> None:
     rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
-    assert (
-        answers.advice("ppo", answers.first_choice(rows)) == "Under PPO, take the law that your library has."
-    )
-    said = bullet("Then take the law that your library has.")
-    final, area = (answers.of(rows, law="beta", endpoint=e) for e in ("final", "area"))
-    assert all(row.study == 2 for row in (*final, *area))
-    above, below = (Counter(grade(row) for row in final if answers.sign(row) == way) for way in (1, -1))
-    assert above == {"found with fresh seeds": 1, "suggested": 1}
-    assert "above a Gaussian on 2 of 6 robots (found on 1, suggested on 1) and below it on none" in said
-    assert not below
-    assert [grade(row) for row in area if answers.sign(row) < 0] == ["suggested"]
-    assert "its learning curve lies lower on 1 (suggested)" in said
+    assert answers.first_choice(rows) == ""
+    assert "no law leads" in answers.advice("ppo", "")
+    said = bullet("Then no law leads.")
+    graded = {
+        (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)
+        for law in ("beta", "logit-normal")
+        for endpoint in ("final", "area")
+        for here in [answers.of(rows, law=law, endpoint=endpoint)]
+        for way in (1, -1)
+    }
+    assert all(row.study == 2 for row in rows)
+    apart = {"found with fresh seeds": 1, "suggested": 1}
+    assert graded["beta", "final", 1] == apart
+    assert not graded["beta", "final", -1]
+    assert graded["beta", "area", -1] == {"suggested": 1}
+    assert "Beta ends above a Gaussian on 2 of 6 robots (found on 1) and below on none" in said
+    assert "by area below on 1 (suggested)" in said
+    assert not graded["logit-normal", "final", 1]
+    assert graded["logit-normal", "final", -1] == apart
+    assert "a logit-normal ends above it on none, and below on 2 (found on 1)" in said
 
 
 def test_the_median() -> None:
-    mode = ways_to_act.count(ways_to_act.rows_of(study_pages.shipped()), "mode")
+    shipped = study_pages.shipped()
+    fresh = Outcomes.read(shipped.folder, grid.second_cells())
+    first, second = (ways_to_act.count(ways_to_act.rows_of(each), "mode") for each in (shipped, fresh))
     said = bullet("Act by the median")
-    assert f"less than its median in {mode.below} of {mode.cells} cells, and more in {mode.above}." in said
+    assert f"less than its median in {first.below} of {first.cells} cells, and more in {first.above} " in said
+    assert f"with fresh seeds in {second.below} and {second.above} of {second.cells})" in said
 
 
 def test_the_snippet_runs() -> None:

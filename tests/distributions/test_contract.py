@@ -376,3 +376,38 @@ def test_the_standard_deviation_has_a_gradient_where_it_underflows(law: Any) -> 
     (gradient,) = torch.autograd.grad(stddev.sum(), loc)
     below, above = law(*double([0.5 - 1e-5, 0.5 + 1e-5], 0.5), -1.0, 1.0).stddev
     assert gradient.tolist() == pytest.approx([0.0, float(above - below) / 2e-5], rel=1e-7)
+
+
+@pytest.mark.parametrize("law", [LogitNormal, ClippedNormal])
+def test_the_ends_of_the_quantile_function_do_not_spoil_gradients(law: Any) -> None:
+    loc, scale = (torch.tensor(x, dtype=torch.float64, requires_grad=True) for x in (0.1, 0.5))
+    p = torch.tensor([0.0, 0.3, 1.0], dtype=torch.float64, requires_grad=True)
+    quantiles = law(loc, scale, -1.0, 1.0).icdf(p)
+    assert torch.allclose(quantiles[::2].abs(), torch.ones(2, dtype=torch.float64))
+    all_three = torch.autograd.grad(quantiles.sum(), (loc, scale), retain_graph=True)
+    alone = torch.autograd.grad(quantiles[1], (loc, scale), retain_graph=True)
+    assert all_three == alone
+    assert torch.isfinite(torch.autograd.grad(quantiles.sum(), p)[0]).all()
+    assert law(0.0, 1.0, -1.0, 1.0).icdf(torch.tensor([-0.1, 1.1])).isnan().all()
+
+
+@pytest.mark.parametrize("registry", [torch.distributions.biject_to, torch.distributions.transform_to])
+def test_torch_knows_a_map_onto_the_open_interval(registry: Any) -> None:
+    law = LogitNormal(torch.zeros(2), torch.ones(2), torch.tensor([-1.0, 0.0]), torch.tensor([1.0, 5.0]))
+    to_box = registry(law.support)
+    x = torch.tensor([[-3.0, 0.5]])
+    assert torch.allclose(to_box(x), law.latent_to_value(x))
+    assert torch.allclose(to_box.inv(to_box(x)), x, atol=1e-5)
+
+
+def test_bounds_of_one_box_in_two_precisions_are_equal() -> None:
+    p = LogitNormal(torch.tensor(0.0), 1.0, 0.1, 0.7)
+    q = LogitNormal(*(torch.tensor(x, dtype=torch.float64) for x in (0.5, 1.0, 0.1, 0.7)))
+    assert torch.distributions.kl_divergence(p, q).item() == pytest.approx(0.125)
+
+
+def test_bounds_that_rounding_made_equal_are_told_apart_from_swapped_ones() -> None:
+    with pytest.raises(ValueError, match=r"use float64 where torch\.float32 made one"):
+        ScaledBeta(2.0, 2.0, 100.0, 100.000001)
+    with pytest.raises(ValueError, match="Swap the bounds"):
+        ScaledBeta(2.0, 2.0, 1.0, 0.0)

@@ -1,12 +1,15 @@
 import copy
 import dataclasses
+import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import warnings
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +18,10 @@ import pytest
 import torch
 from gymnasium.wrappers.vector import NormalizeReward
 
-from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, train
+from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, save_run, train
+from inbounds.learning.families.family import Limits
 from inbounds.learning.storage import checkpoint
+from inbounds.learning.storage.run_metadata import metadata_of
 from inbounds.learning.storage.whole_files import DamagedFileError, held
 from inbounds.learning.training import prepare
 from tests.learning.point import PointEnv
@@ -121,6 +126,12 @@ def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:
     whole = train(config, make_envs=forgetful)
     assert same_records(whole.records[:2], resumed.records[:2])
     assert not torch.equal(weights(whole), weights(resumed))
+
+
+def test_a_run_goes_on_in_environments_that_cannot_take_a_state(tmp_path: Path) -> None:
+    train(small_config(epochs=2), run_dir=tmp_path, make_envs=PointEnv)
+    resumed = train(small_config(epochs=3), run_dir=tmp_path, make_envs=lambda n: PointEnv(n, saves=False))
+    assert len(resumed.records) == 3
 
 
 @pytest.mark.parametrize("algo", ["ppo", "trpo", "policy-gradient"])
@@ -232,6 +243,23 @@ def test_a_checkpoint_is_written_every_so_many_epochs_and_at_the_end(
 def test_a_number_in_a_checkpoint_keeps_its_shape(tmp_path: Path) -> None:
     checkpoint.save(tmp_path / "one.pt", some_state(1) | {"of no dimension": np.array(3.0)})
     assert checkpoint.load(tmp_path / "one.pt")["of no dimension"].shape == ()
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [np.random.default_rng(0), frozenset({1}), np.array([None]), np.array(["a"]), Path("x"), deque([1])],
+)
+def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, kept: Any) -> None:
+    path = tmp_path / checkpoint.FILE_NAME
+    checkpoint.save(path, some_state(1))
+    with pytest.raises(TypeError, match=r"cannot keep state\['envs'\]\[1\], of type .*bit_generator.state"):
+        checkpoint.save(path, some_state(2) | {"envs": [0, kept]})
+    assert checkpoint.load(path)["records"] == [1]
+
+
+def test_numbers_of_another_byte_order_are_kept(tmp_path: Path) -> None:
+    checkpoint.save(tmp_path / "one.pt", some_state(1) | {"big": np.array([1.5, -2.0], ">f8")})
+    assert checkpoint.load(tmp_path / "one.pt")["big"].tolist() == [1.5, -2.0]
 
 
 def some_state(epoch: int) -> dict[str, Any]:
@@ -361,6 +389,55 @@ def test_an_exploding_seed_is_marked_when_it_explodes() -> None:
         warnings.simplefilter("error")
         record = trainer.epoch()  # reported once
     assert record["diverged"].tolist() == [False, False, True]
+
+
+def test_a_warning_that_is_an_error_loses_nothing() -> None:
+    trainer = Trainer(small_config(epochs=3), PointEnv)
+    trainer.networks.critic.theta[2, 5] = torch.inf
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DivergedSeedWarning)
+        with pytest.raises(DivergedSeedWarning):
+            trainer.epoch()
+        assert trainer.records[0]["diverged"].tolist() == [False, False, True]
+        trainer.epoch()  # reported once
+    assert len(trainer.records) == 2
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path: Path) -> None:
+    """They are kept as Python's, and those that decide a precision are Python's."""
+    config = small_config(epochs=1)
+    numpys = dataclasses.replace(
+        config,
+        epochs=np.int64(1),
+        policy=dataclasses.replace(
+            config.policy, limits=Limits(log_std_max=np.float64(1)), initial_std=np.float32(0.5)
+        ),
+    )
+    assert type(numpys.policy.limits.log_std_max) is float
+    run = train(numpys, make_envs=PointEnv)
+    save_run(tmp_path, run)
+    assert json.loads(metadata_of(numpys))["config"]["policy"]["initial_std"] == 0.5
+    plain = dataclasses.replace(
+        config, policy=dataclasses.replace(config.policy, initial_std=0.5, limits=Limits(log_std_max=1))
+    )
+    assert torch.equal(weights(train(plain, make_envs=PointEnv)), weights(run))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"algorithm": "trpo"}, {"policy": "beta"}, {"network": 64}, {"seeds": 3}, {"seeds": np.int64(3)}],
+)
+def test_names_and_numbers_are_what_presets_take(wrong: dict[str, Any]) -> None:
+    with pytest.raises(TypeError, match=rf"{next(iter(wrong))} must be a .*`preset` takes"):
+        TrainConfig(**wrong)
+
+
+def test_networks_can_be_pickled() -> None:
+    trainer = Trainer(small_config(epochs=1), PointEnv)
+    copied = pickle.loads(pickle.dumps(trainer.networks))
+    assert torch.equal(copied.actor.theta, trainer.networks.actor.theta)
+    assert copied.policy.config == trainer.networks.policy.config
+    assert copied.policy.dtype == trainer.networks.policy.dtype
 
 
 def test_presets_are_the_table() -> None:

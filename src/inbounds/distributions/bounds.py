@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
-from torch.distributions import Distribution, constraints
+from torch.distributions import Distribution, Transform, biject_to, constraints, transform_to
 
 __all__ = [
     "BoundedDistribution",
@@ -56,6 +56,13 @@ class OpenInterval(constraints.Constraint):
 
     def __repr__(self) -> str:
         return f"OpenInterval(low={self.lower_bound}, high={self.upper_bound})"
+
+
+@biject_to.register(OpenInterval)
+@transform_to.register(OpenInterval)
+def _from_the_line(constraint: OpenInterval) -> Transform:
+    """Return the map of the real line onto the interval, as for torch's own closed one."""
+    return biject_to(constraints.interval(constraint.lower_bound, constraint.upper_bound))
 
 
 class BoundedDistribution(Distribution):
@@ -289,7 +296,9 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
     """
     if torch.compiler.is_compiling() or not (p._validate_args or q._validate_args):
         return  # compiled code cannot branch on numbers, nor can torch.vmap
-    if bool(((p.low != q.low) | (p.high != q.high)).any()):
+    kind = min((p.low.dtype, q.low.dtype), key=lambda kind: torch.finfo(kind).bits)  # 0.1 is not 0.1 in both
+    pairs = ((p.low.to(kind), q.low.to(kind)), (p.high.to(kind), q.high.to(kind)))
+    if any(bool((one != other).any()) for one, other in pairs):
         raise ValueError(
             "the KL divergence needs equal bounds, but "
             f"p has low={p.low.tolist()}, high={p.high.tolist()} and q has low={q.low.tolist()}, "
@@ -323,8 +332,10 @@ def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:
         "the bounds must be finite",
         "An unbounded action needs no bounded law: use a Normal, or choose finite bounds.",
     )
+    order = "low must be less than high"
+    complain(low > high, order, "Swap the bounds.")
     complain(
-        low >= high, "low must be less than high", "Swap the bounds, or drop the action that has no range."
+        low == high, order, f"Drop the action without a range, or use float64 where {low.dtype} made one."
     )
     complain(
         torch.isinf(high - low),

@@ -43,7 +43,8 @@ def _remedy(space: Any) -> tuple[str, str] | None:
         return "be points of a bounded, one-dimensional Box", f"wrap the environment in {made}"
     if not np.issubdtype(space.dtype, np.floating):
         made = wrapped.format(
-            "lambda action: np.rint(action).astype(int)", "the same Box of floating-point numbers"
+            "lambda action: np.rint(action).astype(env.action_space.dtype)",
+            "the same Box of floating-point numbers",
         )
         return "be real numbers", f"they would be cut off at the point; to round them, use {made}"
     if len(space.shape) != 1:
@@ -57,4 +58,10 @@ def _remedy(space: Any) -> tuple[str, str] | None:
         back = "lambda action: np.clip(action, env.action_space.low, env.action_space.high)"
         made = wrapped.format(back, f"one with room in component {fixed}")
         return "have low below high", f"component {fixed} has no room; wrap the environment in {made}"
+    if not np.isfinite(space.high - space.low).all():
+        made = wrapped.format("lambda action: action", "a smaller one")
+        return (
+            "have a finite range",
+            f"high − low overflows; choose others, and wrap the environment in {made}",
+        )
     return None

@@ -25,10 +25,10 @@ from typing import Any, ClassVar, NamedTuple
 import torch
 from torch import Tensor
 from torch.distributions import Normal, constraints, kl_divergence, register_kl
-from torch.special import log_ndtr, ndtri
+from torch.special import log_ndtr
 
 from inbounds.distributions.bounds import BoundedDistribution, TensorLike, require_equal_bounds
-from inbounds.distributions.standard_normal import standard_normal_cdf, standard_normal_pdf
+from inbounds.distributions.standard_normal import normal_quantile, standard_normal_cdf, standard_normal_pdf
 
 __all__ = ["ClippedNormal", "gaussian_kl_upper_bound"]
 
@@ -129,7 +129,7 @@ class ClippedNormal(BoundedDistribution):
 
     def icdf(self, value: Tensor) -> Tensor:
         """Return the quantile of probability value, `[...]`: the Normal's, clipped; NaN beyond [0, 1]."""
-        return self.latent_to_value(self.loc + self.scale * ndtri(value))
+        return self.latent_to_value(normal_quantile(value, self.loc, self.scale))
 
     def entropy(self) -> Tensor:
         """Return the entropy of the mixed law, `[...]`, in nats: −E[log_prob(a)].

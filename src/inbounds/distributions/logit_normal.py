@@ -32,7 +32,7 @@ from torch.nn.functional import logsigmoid
 
 from inbounds.distributions.bounds import SigmoidMapped, TensorLike, require_equal_bounds
 from inbounds.distributions.quadrature import expectation, graded_trapezoid
-from inbounds.distributions.standard_normal import standard_normal_cdf
+from inbounds.distributions.standard_normal import normal_quantile, standard_normal_cdf
 
 __all__ = ["LogitNormal"]
 
@@ -141,7 +141,7 @@ class LogitNormal(SigmoidMapped):
 
     def icdf(self, value: Tensor) -> Tensor:
         """Return the quantile of probability value, `[...]`; strictly inside the bounds, NaN beyond [0, 1]."""
-        return self.latent_to_value(self.loc + self.scale * torch.special.ndtri(value))
+        return self.latent_to_value(normal_quantile(value, self.loc, self.scale))
 
     def entropy(self) -> Tensor:
         """Return the differential entropy `[...]` in nats, the interval's length included.

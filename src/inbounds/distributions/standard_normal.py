@@ -1,11 +1,12 @@
-"""Density φ and distribution function Φ of the standard Normal, with their tails."""
+"""Density φ and distribution function Φ of the standard Normal, with their tails, and quantiles of any Normal."""
 
 import math
 
 import torch
 from torch import Tensor
+from torch.special import ndtri
 
-__all__ = ["standard_normal_cdf", "standard_normal_pdf"]
+__all__ = ["normal_quantile", "standard_normal_cdf", "standard_normal_pdf"]
 
 
 def standard_normal_pdf(x: Tensor) -> Tensor:
@@ -32,3 +33,21 @@ def standard_normal_cdf(x: Tensor) -> Tensor:
         '7.620e-24 0.000e+00'
     """
     return torch.erfc(-x / math.sqrt(2)) / 2
+
+
+def normal_quantile(probability: Tensor, loc: Tensor, scale: Tensor) -> Tensor:
+    """Return loc + scale · Φ⁻¹(probability), broadcast; −∞ and ∞ at 0 and 1, NaN beyond.
+
+    What is not finite is a constant: a bound that it is clamped to does not move, and 0 · ∞ is NaN.
+
+    Example:
+        >>> import torch
+        >>> scale = torch.tensor(2.0, requires_grad=True)
+        >>> quantile = normal_quantile(torch.tensor([0.0, 0.5]), torch.tensor(1.0), scale)
+        >>> quantile.clamp(-3, 3).sum().backward()
+        >>> quantile.tolist(), scale.grad.item()
+        ([-inf, 1.0], 0.0)
+    """
+    inside = (probability > 0) & (probability < 1)
+    latent = loc + scale * ndtri(torch.where(inside, probability, 0.5))
+    return torch.where(inside, latent, ndtri(probability).detach())

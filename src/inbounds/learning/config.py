@@ -62,6 +62,17 @@ class TrainConfig:
     """Epochs between checkpoints, where a run directory is given; the last epoch always has one."""
 
     def __post_init__(self) -> None:
+        algorithms = tuple(kind for kind, _ in ALGORITHMS.values())
+        for name, kinds in (
+            ("algorithm", algorithms),
+            ("policy", (PolicyConfig,)),
+            ("network", (NetworkConfig,)),
+        ):
+            if not isinstance(given := getattr(self, name), kinds):
+                wanted = " or a ".join(kind.__name__ for kind in kinds)
+                raise TypeError(f"{name} must be a {wanted}, got {given!r}; `preset` takes names")
+        if isinstance(self.seeds, int | np.integer):
+            raise TypeError(f"seeds must be a sequence, got {self.seeds}; `preset` takes a number of seeds")
         object.__setattr__(self, "seeds", tuple(map(operator.index, self.seeds)))  # NumPy's integers, too
         check(self, positive=("epochs", "checkpoint_every"))
         if (

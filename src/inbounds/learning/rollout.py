@@ -280,11 +280,11 @@ class Collector:
         restore_generators([stream.noise for stream in self.streams], state["noise"])
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
-        if state["envs"] is None:
+        envs: Any = next((e for e in (self.envs, self.envs.unwrapped) if hasattr(e, "set_state")), None)
+        if state["envs"] is None or envs is None:
             # New starts, decided by the state; their observations are seen with the statistics that have been loaded.
             self.restart([int(stream.noise.integers(2**31)) for stream in self.streams])
         else:
-            envs: Any = self.envs if hasattr(self.envs, "set_state") else self.envs.unwrapped
             envs.set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
 

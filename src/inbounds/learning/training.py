@@ -5,12 +5,12 @@
     >>> run.records[-1]["env_steps"], run.records[-1]["kl"].shape
     (2048, (2,))
 
-**The law of lockstep.** A seed's run does not depend on which other seeds it runs beside. On one machine and with one
-set of wheels this holds to the last bit for any two runs of two seeds or more, whatever the row a seed has in each,
-and even if a neighbour's numbers are all NaN. A seed *alone* takes another path through the matrix library and agrees
-to the rounding of a single gradient step (measured over a few updates: 1e-7 in float32, 1e-15 in float64), which a
-long run in chaotic physics amplifies. Under the engine `compiled`, where each seed is learned from by itself, a seed
-alone is bit for bit the seed in company, too. The number of threads does not matter: training uses one.
+**The law of lockstep.** A seed's run does not depend on which other seeds it runs beside. On one machine, with one set
+of wheels, this holds to the last bit for any two runs of two seeds or more, whatever the row a seed has in each, even
+if a neighbour is all NaN; for hidden layers, horizons and minibatches that are multiples of 16. A seed *alone* takes
+another path through the matrix library and agrees to the rounding of a single gradient step (measured over a few
+updates: 1e-7 in float32, 1e-15 in float64), which a long run in chaotic physics amplifies. The engine `compiled`
+learns from each seed by itself: alone or in company, bit for bit. Threads do not matter: training uses one.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Trainer:
         with one_thread(), one_blas_thread():
             self.rollout = rollout = self.collector.collect(algorithm.horizon)
             diagnostics = self._update(rollout)
-        self._mark_diverged(rollout)
+        told = self._mark_diverged(rollout)
         record: Record = {
             "epoch": len(self.records),
             "env_steps": algorithm.horizon * (len(self.records) + 1),
@@ -126,6 +126,8 @@ class Trainer:
             "diverged": self.diverged.copy(),
         }
         self.records.append(record)
+        for each in told:  # when all is kept: who turns it into an error may go on
+            warnings.warn(each, DivergedSeedWarning, stacklevel=2)
         return record
 
     def _update(self, rollout: Rollout) -> dict[str, Tensor]:
@@ -136,31 +138,29 @@ class Trainer:
             return self.optimizer.update(update, rollout, shuffles, algorithm)
         return update(self.networks, self.optimizer, rollout, shuffles, algorithm)
 
-    def _mark_diverged(self, rollout: Rollout) -> None:
-        """Mark, and warn of, the seeds whose weights have just ceased to be finite; say where that came from."""
-        now = ~self.networks.finite().numpy()
+    def _mark_diverged(self, rollout: Rollout) -> list[str]:
+        """Mark the seeds whose weights have just ceased to be finite; return the warnings, where that came from."""
+        told, now = [], ~self.networks.finite().numpy() & ~self.diverged
         finite = rollout.obs.isfinite().all(2) & rollout.reward.isfinite() & rollout.bootstrap.isfinite()
-        received = finite.all(
-            1
-        ).numpy()  # [S]; the bootstrap has seen the last observations of rollout and episodes
-        self.fed_nonsense |= now & ~self.diverged & ~received
+        # [S]; the bootstrap has seen the last observations of rollout and episodes.
+        received = finite.all(1).numpy()
+        self.fed_nonsense |= now & ~received
         for new, advice in (
-            (now & ~self.diverged & received, "train with a smaller learning_rate"),
+            (now & received, "train with a smaller learning_rate"),
             (
-                now & ~self.diverged & ~received,
+                now & ~received,
                 "mend the environment, which has returned an observation or a reward that is no finite number "
                 "(gymnasium.utils.env_checker.check_env looks for more)",
             ),
         ):
             if new.any():
                 seeds = [seed for seed, is_new in zip(self.config.seeds, new, strict=True) if is_new]
-                warnings.warn(
+                told.append(
                     f"seeds {seeds} diverged in epoch {len(self.records)}: their weights are not finite. They are "
-                    f"marked in every later record; leave them out of means, or {advice}",
-                    DivergedSeedWarning,
-                    stacklevel=3,
+                    f"marked in every later record; leave them out of means, or {advice}"
                 )
         self.diverged |= now
+        return told
 
     @property
     def finished(self) -> bool:

@@ -75,7 +75,8 @@ def test_the_finding_follows_the_rows() -> None:
     rows = [row("beta", 4, 9), row("beta", -5, 5, robot="Hopper")]
     said = winners.finding(winners.by_test(["higher", "lower", ""]), rows, "beta", "ppo")
     assert said == (
-        "Under PPO the Beta ends above the clipped Gaussian on 1 of 3 robots, and below it on 1 (found). "
+        "From the usual starts, under PPO, the Beta is found above the clipped Gaussian on 1 of 3 robots and below it "
+        "on 1. "
         "When both start equally quiet, the Beta ends above on 1 of 2 robots (found) and below on none."
     )
     fresh = [dataclasses.replace(each, study=2) for each in rows]

@@ -62,14 +62,14 @@ def advice(algorithm: str, law: str) -> str:
 
     Example:
         >>> advice("trpo", "")
-        'Under TRPO, take the law that your library has.'
+        "Under TRPO no law leads: take your library's."
     """
     told = {
-        "": "take the law that your library has",
-        "beta": "try the Beta",
-        "logit-normal": "try the logit-normal",
+        "": " no law leads: take your library's",
+        "beta": ", try the Beta",
+        "logit-normal": ", try the logit-normal",
     }
-    return f"Under {algorithm.upper()}, {told[law]}."
+    return f"Under {algorithm.upper()}{told[law]}."
 
 
 def counted(rows: Sequence[Evidence]) -> str:
@@ -102,14 +102,14 @@ def short(rows: Sequence[Evidence]) -> str:
 
 
 def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
-    """Return `short` of the final returns, and on how many robots the law is below by area, where it is.
+    """Return `short` of the final returns, and of the areas where some are below.
 
     Example:
         >>> in_short([], [])
         'not run yet'
     """
-    below = sum(sign(row) < 0 for row in area)
-    return short(final) + (f" (by area, below on {below})" if below else "")
+    above, below = (sum(sign(row) == way for row in area) for way in (1, -1))
+    return short(final) + (f" (by area on {above} and {below})" if below else "")
 
 
 def in_brackets(rows: Sequence[Evidence]) -> str:

@@ -15,7 +15,7 @@ from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.study_panels import left_out
-from inbounds.book.report.words import HEADS
+from inbounds.book.report.words import HEADS, by_robot
 from inbounds.study.analysis import estimate
 from inbounds.study.cell import Cell
 from inbounds.study.grid import FREE, SECOND, second_cells
@@ -258,6 +258,24 @@ def secondary_comparisons(outcomes: Outcomes) -> Shown:
     head = ["difference", "robot", "endpoint", "", "", "p, Holm over robots", "over everything", "question"]
     caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
     return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
+
+
+def secondary_verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "final") -> str:
+    """Return on which robots a secondary comparison finds its first side above the second, and below.
+
+    Args:
+        outcomes: of either study.
+        question: a key of `inbounds.study.second.secondary.PAIRS`.
+        family: of the first side.
+        endpoint: final or area.
+    """
+    rows = [
+        row
+        for row in secondary(_second(outcomes))
+        if (row.question, row.pair.first.family, row.endpoint) == (question, family, endpoint)
+        and row.comparison.difference is not None
+    ]
+    return by_robot([(row.robot, verdict(row.comparison)) for row in rows])
 
 
 def engine_check(outcomes: Outcomes) -> Shown:

@@ -88,11 +88,11 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
 
     Example:
         >>> finding("above the clipped Gaussian on 4 of 6 robots", [], "beta", "ppo").partition(". ")[0]
-        'Under PPO the Beta ends above the clipped Gaussian on 4 of 6 robots'
+        'From the usual starts, under PPO, the Beta is found above the clipped Gaussian on 4 of 6 robots'
     """
     here = of(rows, law=law, algorithm=algorithm, endpoint="final")
     name = BOUNDED[law]
-    first = f"Under {algorithm.upper()} the {name} ends {as_they_come}."
+    first = f"From the usual starts, under {algorithm.upper()}, the {name} is found {as_they_come}."
     if not here:
         return f"{first} From an equally quiet start the two were not compared yet."
     above, below = ([row for row in here if sign(row) == way] for way in (1, -1))
@@ -118,10 +118,10 @@ def by_test(words: Sequence[str]) -> str:
 
     Example:
         >>> by_test(["higher", "unresolved"])
-        'above the clipped Gaussian on 1 of 2 robots, and below it on none (found)'
+        'above the clipped Gaussian on 1 of 2 robots and below it on none'
     """
     above, below = _of(words.count("higher"), len(words)), _none(words.count("lower"))
-    return f"above the clipped Gaussian on {above}, and below it on {below} (found)"
+    return f"above the clipped Gaussian on {above} and below it on {below}"
 
 
 def _of(count: int, total: int) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report.study_figures import SHORT
@@ -39,6 +40,31 @@ def title_of(arm: str, algorithm: str) -> str:
 def pair_name(contrast: Contrast) -> str:
     """Return what is compared, as a difference."""
     return f"{SHORT[contrast.first]} − {SHORT[contrast.second]}"
+
+
+def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
+    """Return on which robots a difference is found above 0, on which below, and on how many it is not.
+
+    Args:
+        verdicts: robot, and what `inbounds.study.words.verdict` says there.
+
+    Example:
+        >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm"), ("Swimmer", "unresolved")])
+        'above on 1 of 3 robots (Ant), below on 0, not after Holm on 1, no difference found on 1'
+        >>> by_robot([])
+        'not run yet'
+    """
+    if not verdicts:
+        return "not run yet"
+    parts = []
+    for word, name, size in (("higher", "above", f" of {len(verdicts)} robots"), ("lower", "below", "")):
+        robots = [robot for robot, verdict in verdicts if verdict == word]
+        named = f" ({', '.join(robots)})" if robots else ""
+        parts.append(f"{name} on {len(robots)}{size}{named}")
+    counts = Counter(verdict for _, verdict in verdicts)
+    if counts["not after Holm"]:
+        parts.append(f"not after Holm on {counts['not after Holm']}")
+    return f"{', '.join(parts)}, no difference found on {counts['unresolved']}"
 
 
 def in_words(panels: Mapping[str, Mapping[str, Estimate | None]]) -> str:

@@ -77,6 +77,9 @@ class Limits:
     """Upper cap of a Beta's α and β; a floor under its variance."""
 
     def __post_init__(self) -> None:
+        for name in ("log_std_min", "log_std_max", "concentration_max"):
+            # Beside a number of NumPy's, which has a precision, float32 actions would be computed in float64.
+            object.__setattr__(self, name, float(getattr(self, name)))
         if not self.log_std_min < self.log_std_max:
             raise ValueError(
                 f"log_std_min must be below log_std_max, got {self.log_std_min} and {self.log_std_max}: swap them"

@@ -119,6 +119,10 @@ class Policy:
         self.centre, self.half_range = (high + low) / 2, (high - low) / 2
         self._as_executed = [bound.astype(self.dtype) for bound in (low, high, self.centre)]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it was made from; a family's functions have no names to be found by."""
+        return type(self), (self.config, self.low.astype(self.dtype), self.high.astype(self.dtype))
+
     def parameters(self, outputs: Array, xp: ModuleType = torch) -> Parameters:
         """Return the law's parameters `[..., A]` for network outputs `[..., 2A]`."""
         return self.law.parameters(outputs, self.config.limits, xp)

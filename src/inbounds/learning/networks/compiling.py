@@ -108,7 +108,7 @@ class ReadFromDisk:
         done = subprocess.run(
             [sys.executable, "-c", command],
             input=pickle.dumps((*self._recipe, types)),
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
             capture_output=True,
             check=False,
         )

@@ -13,6 +13,7 @@ import torch
 from inbounds.learning.storage.whole_files import damaged, says_nothing_of_the_file, write_whole
 
 FILE_NAME = "checkpoint.pt"
+_KEPT = (bool, int, float, complex, str, bytes, set, torch.Tensor, type(None))
 
 
 def save(path: Path, state: dict[str, Any]) -> None:
@@ -23,6 +24,7 @@ def save(path: Path, state: dict[str, Any]) -> None:
         state: nested dictionaries, lists, tuples, numbers, strings, tensors and NumPy arrays.
 
     Raises:
+        TypeError: it holds something else, which could not be read again; the old file is untouched.
         OSError: it could not be written, as on a full disk; the old file is untouched.
     """
     buffer = io.BytesIO()
@@ -61,16 +63,28 @@ def load(path: Path) -> dict[str, Any]:
     return state
 
 
-def _to_tensors(tree: Any) -> Any:
-    if isinstance(tree, np.ndarray):
-        return {"__ndarray__": torch.from_numpy(np.asarray(tree, order="C")).clone()}
+def _to_tensors(tree: Any, place: str = "state") -> Any:
+    """Return a tree that `torch.load` reads without executing anything.
+
+    Raises:
+        TypeError: it holds something else than numbers, strings, arrays of numbers, and collections of them.
+    """
+    if isinstance(tree, np.ndarray) and tree.dtype.kind in "biufc":
+        native = np.asarray(tree, tree.dtype.newbyteorder("="), order="C")
+        return {"__ndarray__": torch.from_numpy(native).clone()}
     if isinstance(tree, np.generic):
-        return tree.item()
+        tree = tree.item()
     if isinstance(tree, dict):
-        return {key: _to_tensors(value) for key, value in tree.items()}
-    if isinstance(tree, list | tuple):
-        return type(tree)(_to_tensors(value) for value in tree)
-    return tree
+        return {key: _to_tensors(value, f"{place}[{key!r}]") for key, value in tree.items()}
+    if type(tree) in (list, tuple):
+        return type(tree)(_to_tensors(value, f"{place}[{i}]") for i, value in enumerate(tree))
+    if isinstance(tree, _KEPT):
+        return tree
+    raise TypeError(
+        f"a checkpoint cannot keep {place}, of type {type(tree).__name__}: let get_state of "
+        "the environment return numbers, strings, arrays of numbers, and lists, tuples and dictionaries of them (of a "
+        "NumPy Generator, its bit_generator.state)"
+    )
 
 
 def _to_arrays(tree: Any) -> Any:

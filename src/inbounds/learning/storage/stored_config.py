@@ -10,6 +10,8 @@ import dataclasses
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import numpy as np
+
 from inbounds.learning.config import TrainConfig
 
 FREE_TO_CHANGE = ("epochs", "checkpoint_every")
@@ -20,7 +22,16 @@ _NO_DEFAULT = object()
 
 def describe(config: TrainConfig) -> dict[str, Any]:
     """Return a configuration as nested plain dictionaries, the algorithm's name included."""
-    return {**dataclasses.asdict(config), "algorithm_name": config.algorithm_name}
+    return {**_native(dataclasses.asdict(config)), "algorithm_name": config.algorithm_name}
+
+
+def _native(tree: Any) -> Any:
+    """Return a tree with Python's numbers in the place of NumPy's, which JSON does not know."""
+    if isinstance(tree, np.generic):
+        return tree.item()
+    if isinstance(tree, dict):
+        return {name: _native(value) for name, value in tree.items()}
+    return type(tree)(map(_native, tree)) if isinstance(tree, list | tuple) else tree
 
 
 def changed_fields(
