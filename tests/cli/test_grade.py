@@ -157,6 +157,7 @@ def test_the_end_of_grading_is_the_end_of_the_students_process(tmp_path: Path) -
         ([".", "--out", "."], ". cannot be written: choose another --out"),
         ([".", "--out", "no/folder/a.csv"], "there is no folder no/folder for the CSV"),
         (["."], "has no notebook in it"),
+        ([], "name a notebook, or a folder of them"),
     ],
 )
 def test_what_cannot_be_graded_is_said(

@@ -55,7 +55,41 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path: Path) -> None:
     assert "\r" not in out
 
 
-def test_a_bar_on_a_terminal() -> None:
+def test_what_is_kept_is_told_when_nobody_can_be_told(tmp_path: Path) -> None:
+    """A full disk below the output is none below the run."""
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 3), "--checkpoint-every", "1"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert "keeps 1 epochs; the same command goes on from there" in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_without_our_letters_ends_no_run(encoding: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 2)]
+    done = subprocess.run(
+        command, env=os.environ | {"PYTHONIOENCODING": encoding}, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"done: 2 epochs" in done.stdout
+
+
+def test_without_an_output_it_trains(tmp_path: Path) -> None:
+    words = " ".join(small(tmp_path / "run", 2))
+    done = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m inbounds {words} >&-"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(load_checkpoint(tmp_path / "run")["records"]) == 2
+
+
+def test_lines_on_a_terminal_that_cannot_write_over_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "dumb")
+    assert not TrainingProgress(3, Console(force_terminal=True)).moves
+
+
+def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
     console = Console(force_terminal=True, width=150, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
     command = small(Path("unused"))
     from inbounds.cli import options
@@ -111,7 +145,10 @@ def test_when_all_seeds_diverge(tmp_path: Path) -> None:
     "number",
     [
         signal.SIGKILL,
-        *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGINT, signal.SIGTERM)),
+        *(
+            pytest.param(each, marks=pytest.mark.slow)
+            for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        ),
     ],
 )
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(

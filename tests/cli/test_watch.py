@@ -85,6 +85,8 @@ def test_what_has_no_simulation_is_trained_and_not_filmed(tmp_path: Path) -> Non
         ("hopper --seconds 0.1 --width 100000", 1, "choose a smaller width and height"),
         ("hopper --width 63 --seconds 0.1", 2, "must be even"),
         ("hopper --out no/such/folder/film.mp4", 1, "mkdir -p no/such/folder"),
+        ("hopper --out .", 2, ". is a folder: name the film (--out film.mp4)"),
+        ("hopper --out film.gif", 2, "a film is an MP4: --out film.mp4"),
     ],
 )
 def test_what_cannot_be_watched(words: str, code: int, message: str, runs: Path) -> None:

@@ -1,5 +1,6 @@
 """The logit-normal in stable-baselines3: it scores actions, stores latents, and is a Gaussian behind a sigmoid."""
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -173,3 +174,21 @@ def test_an_action_has_its_latent() -> None:
 def test_its_noise_is_its_own() -> None:
     with pytest.raises(ValueError, match="leave use_sde=False"):
         PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")
+
+
+class Named(gymnasium.ObservationWrapper):
+    """Pendulum, its observation in two parts."""
+
+    def __init__(self) -> None:
+        super().__init__(gymnasium.make("Pendulum-v1"))
+        box = spaces.Box(-np.inf, np.inf, (2,), np.float32)
+        self.observation_space = spaces.Dict({"direction": box, "speed": spaces.Box(-9.0, 9.0, (1,))})
+
+    def observation(self, observation):
+        return {"direction": observation[:2], "speed": observation[2:]}
+
+
+def test_observations_may_have_names() -> None:
+    model = PPO(LogitNormalPolicy, Named(), n_steps=32, batch_size=32, n_epochs=1, device="cpu").learn(32)
+    obs, _ = Named().reset(seed=0)
+    assert abs(model.predict(obs)[0]) < 2

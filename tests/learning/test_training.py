@@ -13,12 +13,21 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers.vector import NormalizeReward
 
-from inbounds.learning import DivergedSeedWarning, TrainConfig, Trainer, preset, save_run, train
+from inbounds.learning import (
+    DivergedSeedWarning,
+    TrainConfig,
+    Trainer,
+    load_policies,
+    preset,
+    save_run,
+    train,
+)
 from inbounds.learning.families.family import Limits
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_metadata import metadata_of
@@ -476,6 +485,20 @@ def test_presets_are_the_table() -> None:
 def test_bad_configurations_are_refused(wrong, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         wrong()
+
+
+def test_one_environment_is_no_vector_of_them() -> None:
+    with pytest.raises(ValueError, match=r"takes a vector environment, got .*SyncVectorEnv\(\[make\]"):
+        Trainer(small_config(), lambda _: gymnasium.make("Pendulum-v1"))
+
+
+def test_a_run_of_the_library_becomes_policies(tmp_path: Path) -> None:
+    config = small_config(epochs=1)
+    train(config, run_dir=tmp_path, make_envs=PointEnv)
+    with pytest.raises(FileNotFoundError, match=r"a checkpoint beside it: save_run\("):
+        load_policies(tmp_path)
+    save_run(tmp_path, train(config, run_dir=tmp_path, make_envs=PointEnv))
+    assert len(load_policies(tmp_path)) == 3
 
 
 def test_two_do_not_train_in_one_folder(tmp_path: Path) -> None:

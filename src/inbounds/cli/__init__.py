@@ -55,9 +55,13 @@ def main(args: Sequence[str] | None = None) -> int:
         141 where nobody reads the output any more.
     """
     args = list(sys.argv[1:] if args is None else args)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # no letter that a terminal lacks ends a run
+            stream.reconfigure(errors="replace")
     try:
         code = _run(args)
-        sys.stdout.flush()  # here, where it can still be told that nobody reads it
+        if sys.stdout is not None:  # closed, as some daemons have it
+            sys.stdout.flush()  # here, where it can still be told that nobody reads it
         return code
     except KeyboardInterrupt:
         print("\ninbounds: interrupted", file=sys.stderr)

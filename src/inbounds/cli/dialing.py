@@ -122,8 +122,10 @@ def _do(command: DialCommand, console: Console) -> int:
         say(f"map: {folder.map_file}" if whole else "the same command goes on with the others")
     elif isinstance(command, Status):
         finished = sum(folder.finished(cell) for cell in cells)
-        written = "is" if folder.map_file.is_file() else "is not"
-        say(f"{finished} of {len(cells)} cells are finished, the map {written} written")
+        if folder.map_file.is_file():
+            say(f"the map is written; of its {len(cells)} cells, {finished} lie in {folder.work}")
+        else:
+            say(f"{finished} of {len(cells)} cells are finished, the map is not written")
     elif isinstance(command, Show):
         _show(DialOutcomes(folder.read()), say)
     else:

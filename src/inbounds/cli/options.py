@@ -109,7 +109,7 @@ class Train(TrainConfig):
     """Train a policy, all seeds at once; go on with the run if its directory exists.
 
     The directory keeps curves.parquet (one row per epoch and seed), policies.safetensors (for `inbounds watch` and
-    `inbounds.learning.storage.run_store.load_policy`) and checkpoint.pt (to go on from).
+    `inbounds.learning.load_policy`) and checkpoint.pt (to go on from).
     """
 
     env: Annotated[Positional[str], arg(metavar="ENV")] = "HalfCheetah-v5"

@@ -44,6 +44,8 @@ class TrainingProgress:
         """Whether what was written last found no reader."""
         # In a notebook too, plain lines: they can be read in the stored file.
         self.console = console or Console(highlight=False, force_jupyter=False)
+        self.moves = self.console.is_terminal and not self.console.is_dumb_terminal
+        """Whether a line can be written over."""
         self._returns: Any = None  # [S], of each seed the last one known
         self._recent: deque[tuple[float, int]] = deque(maxlen=20)  # (time, env steps of all seeds)
         self._last_line = -np.inf
@@ -54,7 +56,7 @@ class TrainingProgress:
         self._warnings.__enter__()
         warnings.showwarning = lambda message, *_args, **_kwargs: self.say(f"warning: {message}")
         self._recent.append((time.perf_counter(), 0))
-        if self.console.is_terminal:
+        if self.moves:
             self._live.start()
         return self
 
@@ -71,7 +73,7 @@ class TrainingProgress:
         self._recent.append((now, self._recent[-1][1] + horizon * len(trainer.config.seeds)))
         self._remember_returns(trainer)
         text = self._describe(record, done)
-        if self.console.is_terminal:
+        if self.moves:
             self._live.update(self._picture(text, done))
         elif now - self._last_line >= SECONDS_BETWEEN_LINES or done >= self.epochs:
             self.say(text)

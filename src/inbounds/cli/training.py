@@ -53,8 +53,11 @@ class Stop:
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
-        """Take Ctrl-C, and what job schedulers send, as such signals."""
-        before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
+        """Take Ctrl-C, what job schedulers send, and a closed terminal as such signals."""
+        numbers = [signal.SIGINT, signal.SIGTERM]
+        if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as under nohup
+            numbers.append(signal.SIGHUP)
+        before = {number: signal.signal(number, self) for number in numbers}
         try:
             yield
         finally:
@@ -142,11 +145,11 @@ class _Session:
 
     def _after_epoch(self, trainer: Trainer, record: Record, watchers: list[Any]) -> None:
         self.done = len(trainer.records)
-        for watcher in watchers:
-            watcher(trainer, record)
         if self.done % self.config.checkpoint_every == 0 or self.done == self.config.epochs:
             self.kept = self.done  # `train` has just written the checkpoint
             save_run(self.run_dir, trainer)
+        for watcher in watchers:
+            watcher(trainer, record)
         if self.stop.signal is not None or self.progress.unread:
             self._save(trainer)
             if self.stop.signal is not None:
@@ -210,8 +213,9 @@ def _check_environment(config: TrainConfig) -> None:
     except BackendError:
         raise
     except gymnasium.error.UnregisteredEnv as error:
-        close = difflib.get_close_matches(config.env, [*TASK_NAMES, *gymnasium.registry], n=1)
-        meant = f"did you mean {close[0]}? " if close else ""
+        module, _, name = config.env.rpartition(":")
+        close = difflib.get_close_matches(name, [*TASK_NAMES, *gymnasium.registry], n=1)
+        meant = f"did you mean {module + ':' if module else ''}{close[0]}? " if close else ""
         raise CommandError(
             f"no environment {config.env!r}: {meant}{tasks}; any other id that gymnasium.make knows will do too, "
             "as module:id where a module has to be imported first",
@@ -220,7 +224,7 @@ def _check_environment(config: TrainConfig) -> None:
     except (gymnasium.error.Error, ImportError, ValueError) as error:
         if isinstance(error, ValueError) and not is_ours(error):
             raise  # the environment's own
-        raise CommandError(f"{config.env} will not do: {error}. {tasks}", 2) from error
+        raise CommandError(f"{config.env} will not do: {str(error).rstrip('.')}. {tasks}", 2) from error
 
 
 def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:

@@ -86,6 +86,10 @@ def _check(command: Watch, env: str, path: Path) -> None:
         raise CommandError("--width and --height must be even: the film's colours come in squares of four", 2)
     if command.env_seed < 0:
         raise CommandError("--env-seed must be 0 or more", 2)
+    if path.is_dir():
+        raise CommandError(f"{path} is a folder: name the film (--out {quoted(path / 'film.mp4')})", 2)
+    if path.suffix != ".mp4":
+        raise CommandError(f"a film is an MP4: --out {quoted(path.with_suffix('.mp4'))}", 2)
     if not path.parent.is_dir():
         raise CommandError(
             f"there is no folder {path.parent}: make it first (mkdir -p {quoted(path.parent)})"

@@ -43,7 +43,7 @@ def _remedy(space: Any) -> tuple[str, str] | None:
         return "be points of a bounded, one-dimensional Box", f"wrap the environment in {made}"
     if not np.issubdtype(space.dtype, np.floating):
         made = wrapped.format(
-            "lambda action: np.rint(action).astype(env.action_space.dtype)",
+            f"lambda action: np.rint(action).astype(np.{space.dtype})",
             "the same Box of floating-point numbers",
         )
         return "be real numbers", f"they would be cut off at the point; to round them, use {made}"
@@ -55,10 +55,17 @@ def _remedy(space: Any) -> tuple[str, str] | None:
         return "have finite bounds", f"choose some, and wrap the environment in {made}"
     if not (space.low < space.high).all():
         fixed = np.flatnonzero(~(space.low < space.high))[0]
-        back = "lambda action: np.clip(action, env.action_space.low, env.action_space.high)"
-        made = wrapped.format(back, f"one with room in component {fixed}")
-        return "have low below high", f"component {fixed} has no room; wrap the environment in {made}"
-    if not np.isfinite(space.high - space.low).all():
+        made = wrapped.format(
+            "lambda action: np.clip(action, low, high)", f"one with room in component {fixed}"
+        )
+        return (
+            "have low below high",
+            f"component {fixed} has no room; with low, high = env.action_space.low, env.action_space.high, wrap the "
+            f"environment in {made}",
+        )
+    with np.errstate(over="ignore"):
+        width = space.high - space.low
+    if not np.isfinite(width).all():
         made = wrapped.format("lambda action: action", "a smaller one")
         return (
             "have a finite range",

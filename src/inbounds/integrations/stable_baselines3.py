@@ -28,6 +28,7 @@ from inbounds.integrations.quiet import quiet_scale
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
     from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.common.torch_layers import CombinedExtractor
 except ImportError as error:
     raise ImportError(
         'stable-baselines3 is not installed: pip install ".[integrations]" in the source tree'
@@ -103,7 +104,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
     """The peer's actor-critic with logit-normal actions in any bounded box; see the module.
 
     Args:
-        observation_space: as the peer's.
+        observation_space: as the peer's; a Dict, too.
         action_space: a bounded, one-dimensional Box.
         lr_schedule: as the peer's.
         **options: as the peer's; `log_std_init` is the log σ of the *latent*: 0 executes a standard deviation of
@@ -131,6 +132,10 @@ class LogitNormalPolicy(ActorCriticPolicy):
         require_box(action_space)
         if options.get("use_sde"):
             raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
+        if isinstance(observation_space, gymnasium.spaces.Dict):
+            options.setdefault(
+                "features_extractor_class", CombinedExtractor
+            )  # as the peer's `MultiInputPolicy`
         super().__init__(observation_space, action_space, lr_schedule, **options)
         self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
 

@@ -7,7 +7,8 @@ environment:
 
     actor, acting = bounded_actor(network, LogitNormal, low, high)
     loss = ClipPPOLoss(actor, critic)       # finds "latent" and "latent_log_prob" by itself
-    batch = env.rollout(1000, acting)       # draws, writes both, and "action"
+    with torch.no_grad():
+        batch = env.rollout(1000, acting)   # draws, writes both, and "action"
 
 `quiet_actor` makes the two with a quiet start: centred in the box, with as much executed noise as is asked for.
 

@@ -309,9 +309,14 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         num_seeds: how many there must be.
 
     Raises:
-        ValueError: another number, another autoreset mode, observations that are no Box, or actions that `require_box`
-            refuses.
+        ValueError: no vector environment, another number, another autoreset mode, observations that are no Box, or
+            actions that `require_box` refuses.
     """
+    if not isinstance(envs, VectorEnv) and not hasattr(envs, "num_envs"):
+        raise ValueError(
+            f"training takes a vector environment, got {envs}: let make_envs return "
+            "gymnasium.vector.SyncVectorEnv([make] * n, autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP)"
+        )
     if envs.num_envs != num_seeds:
         raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
     mode = envs.metadata.get("autoreset_mode")

@@ -237,7 +237,7 @@ def train(
 
     Args:
         config: what to do.
-        run_dir: where to keep the checkpoint; None keeps none.
+        run_dir: where to keep the checkpoint; None keeps none. `save_run(run_dir, trainer)` adds policies and curves.
         make_envs: makes a vector environment (`AutoresetMode.SAME_STEP`) for a number of seeds; None makes
             `config.env`.
         callback: called after every epoch with the trainer and the record: a progress bar, a logger.

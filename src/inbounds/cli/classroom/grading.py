@@ -153,6 +153,8 @@ def run(paths: Sequence[Path], seconds: float, gigabytes: float, out: Path | Non
     """
     if not (0 < seconds < math.inf and 0 < gigabytes < MOST_GIGABYTES):
         raise CommandError("--seconds and --gigabytes must be positive numbers", 2)
+    if not paths:
+        raise CommandError("name a notebook, or a folder of them: inbounds grade handed-in", 2)
     if out is not None:
         _require_place(out)
     if importlib.util.find_spec("IPython") is None:

@@ -68,6 +68,11 @@ def find(run: str | Path, name: str) -> Path:
         path /= name
     if not path.is_file():
         out = shlex.quote(str(path.parent if path.name == name else path))
+        if path.with_name("checkpoint.pt").is_file():
+            raise FileNotFoundError(
+                f"there is no {path}, but a checkpoint beside it: save_run(run_dir, train(config, run_dir=run_dir)) of "
+                "inbounds.learning goes on from that and writes it; so does the `inbounds train` command of the run"
+            )
         raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {out})")
     return path
 

@@ -10,7 +10,7 @@ from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.table import Column, Table
 
 from inbounds.study.grid import Cell
 from inbounds.study.running.cell_lock import is_alive, read_claim
@@ -96,7 +96,8 @@ class StudyProgress:
 
 def status_table(cells: Sequence[Cell], folder: StudyFolder) -> Table:
     """Return a table of cells by their state, one row for each arm and robot."""
-    table = Table("arm", "robot", "finished", "running", "begun", "missing", "damaged or other")
+    names = (Column(name, no_wrap=True) for name in ("arm", "robot"))  # whole, also in a pipe
+    table = Table(*names, "finished", "running", "begun", "missing", "damaged or other")
     groups: dict[tuple[str, str], Counter[str]] = {}
     for cell in cells:
         groups.setdefault((cell.arm, cell.robot), Counter())[cell_status(cell, folder)] += 1
