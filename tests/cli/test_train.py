@@ -141,6 +141,14 @@ def test_when_all_seeds_diverge(tmp_path: Path) -> None:
 # ---- interruption
 
 
+HEARING = """
+import signal, sys
+from inbounds.cli import main
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which a process under nohup ignores
+sys.exit(main())
+"""
+
+
 @pytest.mark.parametrize(
     "number",
     [
@@ -157,7 +165,7 @@ def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(
     """Bit for bit: the same rows (wall time apart) and the same policies as the run that was not interrupted."""
     rarely = () if number == signal.SIGKILL else ("--checkpoint-every", "100000")  # then stopping must save
     words = small(tmp_path / "broken", 100_000, "Hopper-v5", *rarely)
-    command = [sys.executable, "-m", "inbounds", *words]
+    command = [sys.executable, "-c", HEARING, *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stderr is not None
