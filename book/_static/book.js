@@ -104,7 +104,8 @@
         start();
       });
       film.addEventListener("pause", () => {
-        if (film.ended || !seen || document.hidden) return;
+        /* At its end, or played again since: the event comes a moment later than the pause. */
+        if (!film.paused || film.ended || !seen || document.hidden) return;
         wanted = false;
         stop();
       });

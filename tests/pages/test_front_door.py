@@ -34,6 +34,16 @@ def test_films_loop_on_one_clock(front: Page) -> None:
     )
 
 
+def test_they_go_on_when_both_end_in_the_same_moment(front: Page) -> None:
+    """The second one's pause is then told after both have begun again."""
+    for _ in range(4):
+        front.wait_for_function(PLAYING)
+        front.evaluate(f"{FILMS}.forEach((film) => {{ film.currentTime = film.duration - 0.05; }})")
+        front.wait_for_function(
+            f"{FILMS}.every((film) => film.currentTime < film.duration - 0.5 && !film.paused)"
+        )
+
+
 def test_one_pause_stops_both_for_good(front: Page) -> None:
     front.wait_for_function(PLAYING)
     front.evaluate(f"{FILMS}[0].pause()")
