@@ -192,7 +192,7 @@ def test_bounded_densities_shows_the_package_s_numbers(page: Page, address: str)
     names = book.pages('data-model="bounded-densities"')
     assert names
     for name in names:
-        page = open_page(page, address + name)
+        open_page(page, address + name)
         for explorable in page.locator("[data-model=bounded-densities]").all():
             mu, log_sigma = explorable.locator("[role=slider]").all()
             for handle, key, times in ((mu, "ArrowLeft", 13), (log_sigma, "ArrowRight", 12)):

@@ -312,7 +312,7 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         ValueError: no vector environment, another number, another autoreset mode, observations that are no Box, or
             actions that `require_box` refuses.
     """
-    if not isinstance(envs, VectorEnv) and not hasattr(envs, "num_envs"):
+    if not hasattr(envs, "num_envs"):
         raise ValueError(
             f"training takes a vector environment, got {envs}: let make_envs return "
             "gymnasium.vector.SyncVectorEnv([make] * n, autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP)"
