@@ -169,7 +169,7 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     assert spoken(change) in next(line for line in later if line[0] == "Ant")
     assert len(page.table("Final policies by way to act")) == 1 + 18
     beyond = {row[1] for row in page.table("Endpoints (TRPO, beyond the thesis)")[1:]}
-    assert beyond == {"Gaussian, clipped", "Clipped Gaussian (CAPG)", "Beta", "Logit-normal"}
+    assert beyond == {"Gaussian, clipped", "CAPG", "Beta", "Logit-normal"}
 
 
 def test_damaged_cells_are_listed(tmp_path: Path) -> None:

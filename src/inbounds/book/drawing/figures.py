@@ -86,7 +86,7 @@ class FamilyStyle:
 LOOKS: Mapping[str, FamilyStyle] = MappingProxyType(
     {
         "gaussian": FamilyStyle("Gaussian, clipped", "#A8330A", "#DD5B33", "--", "s"),
-        "clipped-gaussian": FamilyStyle("Clipped Gaussian (CAPG)", "#CC7E14", "#FFD394", "-.", "D"),
+        "clipped-gaussian": FamilyStyle("CAPG", "#CC7E14", "#FFD394", "-.", "D"),
         "beta": FamilyStyle("Beta", "#1F8277", "#52CCAB", ":", "^"),
         "logit-normal": FamilyStyle("Logit-normal", "#0E2F66", "#6E9CFD", "-", "o"),
     }

@@ -42,7 +42,7 @@ def draw_map(findings: Sequence[Finding], endpoint: Endpoint) -> Figure:
         ax.set_yscale("symlog", linthresh=0.1, linscale=1.5)
         ax.set_yticks([-2, -0.5, -0.1, 0, 0.1, 0.5], ["−2", "−0.5", "−0.1", "0", "0.1", "0.5"])
         ax.minorticks_off()
-        ax.set_title(f"{'raw cost' if cost == 'raw' else 'no cost'}\nA = {dims}")
+        ax.set_title(f"{'raw cost' if cost == 'raw' else 'no cost'}\nd = {dims}")
     axes[0].set_ylabel(f"{endpoint}, minus Gaussian")
     fig.supxlabel("where the best action lies [half-ranges]")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
@@ -77,7 +77,7 @@ def table(findings: Sequence[Finding]) -> str:
         lines.append(_line(name, [f for f in findings if least <= f.setting.fraction <= most]))
     for knobs in dict.fromkeys((f.setting.cost, f.setting.dims) for f in findings):
         chosen = [f for f in findings if (f.setting.cost, f.setting.dims) == knobs]
-        lines.append(_line(f"cost {knobs[0]}, A = {knobs[1]}", chosen))
+        lines.append(_line(f"cost {knobs[0]}, d = {knobs[1]}", chosen))
     return "\n".join([*lines, _line("all", findings)])
 
 

@@ -77,7 +77,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
     known = [row for row in rows if row.difference is not None]
     if not known:
         return html.of_study("the primary comparison", NONE_FINISHED)
-    words = Counter(row.finding or "waits for seeds" for row in known)
+    words = Counter(row.finding or "waiting for seeds" for row in known)
     alt = (
         "Bounded law minus Gaussian with a free σ, in units of the margin, a row per robot, a panel per endpoint. "
         + ". ".join(

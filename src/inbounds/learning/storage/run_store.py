@@ -74,7 +74,7 @@ def save_run(run_dir: str | Path, trainer: Run) -> None:
 
     Args:
         run_dir: the folder; it must exist.
-        trainer: the run, with at least one epoch done. (`load_policy` has an example.)
+        trainer: what `train` returned, with at least one epoch done. (`load_policy` has an example.)
     """
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)
