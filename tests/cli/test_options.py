@@ -130,6 +130,9 @@ def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
             "train CartPole-v1",
             "actions must be points of a bounded, one-dimensional Box, got Discrete(2): wrap",
         ),
+        ("train --algorithm.max-kl 0.02", "--algorithm.max-kl is no option of ppo: add --algo trpo"),
+        ("train --algo trpo --algorithm.clip-range=0.1", "is no option of trpo: add --algo ppo"),
+        ("train --algorithm.max-lk 0.02", "Unrecognized options: --algorithm.max-lk"),
         ("walk", "train, watch, bench"),
     ],
 )
@@ -143,6 +146,15 @@ def test_a_wrong_command_line_is_told_the_right_one(
     assert message in err
     assert out == ""
     assert not list(tmp_path.iterdir())  # a mistyped command leaves nothing behind
+
+
+@pytest.mark.parametrize("words", ["--version", "doctor", "train --help"])
+def test_output_that_has_no_room_is_told_in_a_line(words: str) -> None:
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "inbounds", *words.split()]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "inbounds: the disk is full (where the output goes): make room, and run it again\n"
 
 
 def test_the_version() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sb3_contrib import TRPO
 from scipy import integrate, stats
-from stable_baselines3 import A2C, PPO
+from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.distributions import kl_divergence
 
 from inbounds.integrations.stable_baselines3 import LogitNormalDistribution, LogitNormalPolicy
@@ -174,6 +174,12 @@ def test_an_action_has_its_latent() -> None:
 def test_its_noise_is_its_own() -> None:
     with pytest.raises(ValueError, match="leave use_sde=False"):
         PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")
+
+
+@pytest.mark.parametrize("peer", [SAC, TD3])
+def test_who_learns_off_policy_is_told_so(peer: type) -> None:
+    with pytest.raises(TypeError, match="is for A2C, PPO and TRPO"):
+        peer(LogitNormalPolicy, Tank(), device="cpu")
 
 
 class Named(gymnasium.ObservationWrapper):

@@ -69,8 +69,19 @@ def main(args: Sequence[str] | None = None) -> int:
     except (BrokenPipeError, SystemExit) as error:  # whoever read the output (`| head`) has had enough
         if not is_unread(error):
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python's own last flush
+        _write_no_more()
         return 141
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        _write_no_more()
+        where = error.filename or "where the output goes"
+        print(f"inbounds: the disk is full ({where}): make room, and run it again", file=sys.stderr)
+        return 1
+
+
+def _write_no_more() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python's own last flush
 
 
 def _run(args: list[str]) -> int:

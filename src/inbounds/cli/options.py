@@ -8,13 +8,14 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, Union
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args
 
 import tyro
 from tyro import MISSING_NONPROP
 from tyro.conf import AvoidSubcommands, Positional, arg, subcommand
 from tyro.constructors import PrimitiveConstructorSpec
 
+from inbounds.cli.errors import CommandError
 from inbounds.learning import PolicyConfig, TrainConfig, preset
 
 DESCRIPTION = (
@@ -225,6 +226,7 @@ def parse(args: Sequence[str]) -> Command:
 
     Raises:
         SystemExit: help was asked for and has been written (code 0), or what is wrong has been (code 2).
+        CommandError: an option is another algorithm's.
 
     Example:
         >>> command = parse(["train", "Hopper-v5", "--seeds", "2", "--algo", "trpo", "--algorithm.max-kl", "0.02"])
@@ -252,9 +254,26 @@ def _train_defaults(args: Sequence[str]) -> Train:
     try:
         seen, _ = look.parse_known_args(args)
         config = preset(seen.preset, algo=seen.algo)
+        _forbid_options_of_others(args, seen.algo)
     except (argparse.ArgumentError, ValueError):  # tyro will say what is wrong
         config = preset("common")
     return Train(**_values(config) | {"policy": PolicyOptions(**_values(config.policy))})
+
+
+def _forbid_options_of_others(args: Sequence[str], algo: str) -> None:
+    """Raise a CommandError that names the algorithm whose option this is."""
+    named = [word.partition("=")[0] for word in args if word.startswith("--algorithm.")]
+    fields = {
+        other: {f.name.replace("_", "-") for f in dataclasses.fields(preset("common", algo=other).algorithm)}
+        for other in get_args(AlgorithmName)
+    }
+    for option in named:
+        value = option.removeprefix("--algorithm.").replace("_", "-")
+        forms = {value, value.removeprefix("no-")}
+        owners = [other for other, its in fields.items() if forms & its]
+        if owners and algo not in owners:
+            remedy = " or ".join(f"--algo {owner}" for owner in owners)
+            raise CommandError(f"{option} is no option of {algo}: add {remedy}", exit_code=2)
 
 
 def _values(config: Any) -> dict[str, Any]:

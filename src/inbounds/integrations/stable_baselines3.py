@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
@@ -143,6 +143,14 @@ class LogitNormalPolicy(ActorCriticPolicy):
         """Put our law in the place of the peer's choice before it builds the heads."""
         self.action_dist = LogitNormalDistribution(*self._bounds)
         super()._build(lr_schedule)
+
+    @property
+    def actor(self) -> NoReturn:
+        """Refuse: what asks for it learns off policy, from actions whose gradient it takes."""
+        raise TypeError(
+            "LogitNormalPolicy is for A2C, PPO and TRPO. SAC has a squashed Gaussian of its own, and TD3 and DDPG an "
+            'actor without a law: "MlpPolicy" there'
+        )
 
     def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
