@@ -6,7 +6,6 @@ first_choice(of(rows, algorithm="ppo"))
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -98,7 +97,10 @@ def short(rows: Sequence[Evidence]) -> str:
         >>> short([])
         'not run yet'
     """
-    return re.sub(r" robots?| \(.*?\)|, (too small|no difference).*", "", counted(rows))
+    if not rows:
+        return "not run yet"
+    above, below = (sum(sign(row) == way for row in rows) for way in (1, -1))
+    return f"above on {above} of {len(rows)}, below on {below}"
 
 
 def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
