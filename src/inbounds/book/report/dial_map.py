@@ -70,7 +70,7 @@ def _draw(ax: Axes, law: str, chosen: Sequence[Finding], shift: float) -> None:
 
 def table(findings: Sequence[Finding]) -> str:
     """Return a line per comparison, region and setting: the classes found, and each model's right forecasts."""
-    lines = [f"{'':31}above  below  none  unclear      steps   geometry"]
+    lines = [f"{'':28} above below none unclear      steps   geometry"]
     for pair in dict.fromkeys(f.comparison for f in findings):
         lines.append(_line(" − ".join(pair), [f for f in findings if f.comparison == pair]))
     for name, (least, most) in REGIONS.items():
@@ -87,4 +87,4 @@ def _line(name: str, chosen: Sequence[Finding]) -> str:
     scores = []
     for counts in (tally(chosen), tally(chosen, "geometry")):
         scores.append(f"{counts['right']} of {counts['right'] + counts['wrong']}")
-    return f"{name:30}{found[0]:6}{found[1]:7}{found[2]:6}{found[3]:9}{scores[0]:>11}{scores[1]:>11}"
+    return f"{name:28}{found[0]:6}{found[1]:6}{found[2]:5}{found[3]:8}{scores[0]:>11}{scores[1]:>11}"
