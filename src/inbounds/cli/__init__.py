@@ -21,6 +21,7 @@ EXAMPLES = {
   inbounds train HalfCheetah-v5 --policy logit-normal --algo ppo --seeds 10 --epochs 500
   inbounds train Hopper-v5 --policy beta --preset as-printed --out runs/hopper-beta
   inbounds train Ant-v5 --algo trpo --algorithm.max-kl 0.02 --policy.initial-std 0.5 --tensorboard
+  inbounds train my_module:MyTask-v0 --epochs 50      (imports my_module.py, which registers MyTask-v0)
   inbounds train HalfCheetah-v5 --epochs 1000      (goes on with the first one, to epoch 1000)
   inbounds train --algo trpo --preset as-printed --help      (the values of that algorithm and preset)""",
     "watch": """\
