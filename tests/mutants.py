@@ -703,7 +703,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "study/ledger/verdicts.py",
         'states.count("against") > len(states) - needed >= 0',
         'states.count("against") >= len(states) - needed >= 0',
-        "tests/study/test_ledger.py::test_what_arrives_later_changes_no_decided_verdict",
+        "tests/study/test_ledger.py::test_what_arrives_later_changes_nothing_of_the_small_cases",
     ),
     Mutant(
         "half of a gap is all of it",

@@ -1,5 +1,6 @@
 """The ledger's verdicts follow from its numbers, its numbers from the files: recomputed here by other code."""
 
+import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -80,6 +81,17 @@ def test_what_arrives_later_changes_no_decided_verdict(
     later = [data.draw(st.sampled_from(STATES[:4])) if state == "missing" else state for state in states]
     if before != "undecided":
         assert count(later, needed) == before
+
+
+@pytest.mark.parametrize("length", [1, 2, 3])
+def test_what_arrives_later_changes_nothing_of_the_small_cases(length: int) -> None:
+    """All of them: chance may miss the one that matters."""
+    for states in itertools.product(STATES, repeat=length):
+        fills = [STATES[:4] if state == "missing" else (state,) for state in states]
+        for needed in (None, *range(1, length + 1)):
+            before = count(states, needed)
+            for later in itertools.product(*fills):
+                assert before in ("undecided", count(later, needed)), (states, needed, later)
 
 
 @given(st.lists(st.sampled_from(STATES[:2]), min_size=1, max_size=8), st.integers(1, 8))
