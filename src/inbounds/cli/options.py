@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, Union, get_args
+from typing import Annotated, Any, Literal, TypeAlias, Union
 
 import tyro
 from tyro import MISSING_NONPROP
@@ -17,6 +17,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from inbounds.cli.errors import CommandError
 from inbounds.learning import PolicyConfig, TrainConfig, preset
+from inbounds.learning.config import ALGORITHMS
 
 DESCRIPTION = (
     "Policy gradients on bounded action spaces: train policies over seeds in lockstep, film them, measure. "
@@ -262,16 +263,11 @@ def _train_defaults(args: Sequence[str]) -> Train:
 
 def _forbid_options_of_others(args: Sequence[str], algo: str) -> None:
     """Raise a CommandError that names the algorithm whose option this is."""
-    named = [word.partition("=")[0] for word in args if word.startswith("--algorithm.")]
-    fields = {
-        other: {f.name.replace("_", "-") for f in dataclasses.fields(preset("common", algo=other).algorithm)}
-        for other in get_args(AlgorithmName)
-    }
-    for option in named:
-        value = option.removeprefix("--algorithm.").replace("_", "-")
-        forms = {value, value.removeprefix("no-")}
-        owners = [other for other, its in fields.items() if forms & its]
-        if owners and algo not in owners:
+    for word in args:
+        option = word.partition("=")[0]
+        name = option.removeprefix("--algorithm.").replace("-", "_").removeprefix("no_")
+        owners = [other for other, (kind, _) in ALGORITHMS.items() if name in kind.__dataclass_fields__]
+        if option.startswith("--algorithm.") and owners and algo not in owners:
             remedy = " or ".join(f"--algo {owner}" for owner in owners)
             raise CommandError(f"{option} is no option of {algo}: add {remedy}", exit_code=2)
 

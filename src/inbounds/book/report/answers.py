@@ -99,7 +99,7 @@ def short(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    above, below = (sum(sign(row) == way for row in rows) for way in (1, -1))
+    above, below = _sides(rows)
     return f"above on {above} of {len(rows)}, below on {below}"
 
 
@@ -110,8 +110,13 @@ def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
         >>> in_short([], [])
         'not run yet'
     """
-    above, below = (sum(sign(row) == way for row in area) for way in (1, -1))
+    above, below = _sides(area)
     return short(final) + (f" (by area on {above} and {below})" if below else "")
+
+
+def _sides(rows: Sequence[Evidence]) -> tuple[int, int]:
+    signs = [sign(row) for row in rows]
+    return signs.count(1), signs.count(-1)
 
 
 def in_brackets(rows: Sequence[Evidence]) -> str:
