@@ -21,6 +21,7 @@ LIBRARIES = [
         "pytest",
         "hypothesis",
         "torch",
+        "torch._dynamo",  # which the first optimiser imports
         "numba",
         "scipy.stats",
         "mpmath",
@@ -29,7 +30,7 @@ LIBRARIES = [
         "pyarrow.parquet",
         "tyro",
     ),
-    *("matplotlib.pyplot", "bokeh.plotting"),
+    *("matplotlib.pyplot", "bokeh.plotting", "nbformat"),
 ]
 ANOTHER_PACKAGE = 70
 """Exit status of a run that imported another copy of the package than the one it was given."""
