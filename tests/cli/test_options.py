@@ -125,6 +125,7 @@ def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
         ("train --network.policy-head-gain nan", "policy_head_gain must be a finite number"),
         ("train --policy beta --policy.no-state-dependent-std", "state_dependent_std=True"),
         ("train HalfCheeta-v5", "did you mean HalfCheetah-v5?"),
+        ("train HalfCheetah", "HalfCheetah names no version: ask for HalfCheetah-v5"),
         ("train Tennis-v0", "The tasks are Hopper-v5, Walker2d-v5"),
         (
             "train CartPole-v1",

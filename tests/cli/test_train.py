@@ -240,6 +240,8 @@ def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) ->
         (["--algorithm.clip-range", "0.1"], "(--algorithm.clip-range 0.2 there, 0.1 here)"),
         (["--policy", "beta"], "(--policy logit-normal there, beta here)"),
         (["--algo", "trpo"], "(--algo ppo there, trpo here)"),
+        (["--seeds", "4-6"], "(--seeds 2 there, 4-6 here)"),
+        (["--network.hidden-sizes", "8", "4"], "(--network.hidden-sizes 8 there, 8 4 here)"),
     ],
 )
 def test_another_configuration_is_refused(more: list[str], difference: str, tmp_path: Path) -> None:

@@ -199,6 +199,17 @@ def test_kl_needs_equal_bounds(family: Family, low: float, high: float) -> None:
         kl_divergence(family.make(), family.make(low=low, high=high))
 
 
+def test_unequal_bounds_among_many_are_named_once(family: Family) -> None:
+    high = torch.full((500, 6), 2.0, dtype=torch.float64)
+    other = high.clone()
+    other[3, 4] = 2.5
+    with pytest.raises(
+        ValueError, match=r"p has low=-1\.0, high=2\.0 and q has low=-1\.0, high=2\.5\."
+    ) as caught:
+        kl_divergence(family.make(low=-1.0, high=high), family.make(low=-1.0, high=other))
+    assert len(str(caught.value)) < 200
+
+
 def test_double_derivatives_agree_with_differences(family: Family) -> None:
     """gradcheck and gradgradcheck of all that is differentiable in the parameters, at several of them."""
 

@@ -196,8 +196,13 @@ def test_from_mode_refuses_what_is_no_mode() -> None:
         ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0)
     with pytest.raises(ValueError, match="must not be negative"):
         ScaledBeta.from_mode(0.5, torch.tensor([1.0, -2.0]), -1.0, 1.0)
-    with pytest.raises(ValueError, match="low must be less than high"):
-        ScaledBeta.from_mode(1.0, 2.0, 1.0, 1.0)
+    for low, high, wrong in (
+        (1.0, 1.0, "less than high"),
+        (1.0, -1.0, "Swap"),
+        (math.nan, 1.0, "must be finite"),
+    ):
+        with pytest.raises(ValueError, match=wrong):
+            ScaledBeta.from_mode(0.0, 2.0, low, high)
     assert ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0, validate_args=False).concentration0 == 0.5
 
 

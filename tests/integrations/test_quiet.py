@@ -70,6 +70,26 @@ def test_the_size_of_the_box_does_not_matter(half: float) -> None:
     assert (actions / half).std(0) == pytest.approx([0.4, 0.4], abs=0.01)
 
 
+def test_a_second_call_sets_another_noise_and_nothing_else() -> None:
+    env = TransformAction(Tank(), lambda a: a, spaces.Box(-100, 100, (2,)))
+    model, again = (PPO("MlpPolicy", env, n_steps=128, device="cpu", seed=1) for _ in range(2))
+    quiet_start(model, 0.3), quiet_start(quiet_start(again, 0.4), 0.3)
+    for one, other in zip(model.policy.parameters(), again.policy.parameters(), strict=True):
+        assert torch.equal(one, other)
+
+
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+def test_what_has_been_learned_is_not_overwritten(policy) -> None:
+    model = PPO(policy, Tank(), n_steps=128, device="cpu", seed=1).learn(128)
+    with pytest.raises(ValueError, match="has learned from 128 steps: call it before `learn`"):
+        quiet_start(model)
+
+
+def test_a_number_as_a_bound_does_not_say_how_many_actions_there_are() -> None:
+    with pytest.raises(ValueError, match=r"give the \[A\] of each"):
+        quiet_actor(nn.Linear(2, 8), 8, LogitNormal, -1.0, 1.0)
+
+
 def test_a_quiet_actor_reads_several_names_and_takes_the_bodys_dtype() -> None:
     class Both(nn.Module):
         def __init__(self) -> None:

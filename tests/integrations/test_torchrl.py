@@ -206,3 +206,34 @@ def test_an_impossible_box_is_refused_at_once(law: type, low: float, high: float
     """Although TorchRL has switched off the checks of every distribution."""
     with pytest.raises(ValueError, match=wrong):
         bounded_actor(network(law), law, [-1.0, low], [1.0, high])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_box_of_float64_keeps_what_a_network_of_float64_does_inside(law: type) -> None:
+    """The float32 nearest to 0.3 is larger."""
+    low, high = np.full(2, -0.3), np.full(2, 0.3)
+    head = NormalParamExtractor() if law is LogitNormal else BetaHead()
+    last = nn.Linear(2, 4, dtype=torch.float64)
+    with torch.no_grad():
+        last.bias.copy_(
+            torch.tensor([80.0, -80.0, 0.0, 0.0] if law is LogitNormal else [0.0, 80.0, 80.0, 0.0])
+        )
+    _, acting = bounded_actor(nn.Sequential(last, head), law, low, high)
+    seen = TensorDict(observation=torch.zeros(1000, 2).double(), batch_size=[1000])
+    action = acting(seen)["action"].detach().numpy()
+    assert ((low < action) & (action < high)).all()
+    assert np.ptp(action) > 0.59
+
+
+def test_a_narrow_box_needs_a_network_that_resolves_it() -> None:
+    low, high = np.array([1e9, 1e9]), np.array([1e9, 1e9]) + 1e-3
+    with pytest.raises(ValueError, match=r"in torch\.float32.* use float64"):
+        bounded_actor(network(LogitNormal), LogitNormal, low, high)
+    bounded_actor(network(LogitNormal).double(), LogitNormal, low, high)
+
+
+def test_bounds_of_several_axes_are_refused_and_one_name_will_do() -> None:
+    with pytest.raises(ValueError, match=r"the shape \[2, 2\].* flatten"):
+        bounded_actor(network(LogitNormal), LogitNormal, -np.ones((2, 2)), np.ones((2, 2)))
+    actor, _ = bounded_actor(network(LogitNormal), LogitNormal, LOW, HIGH, in_keys="observation")
+    assert actor(observations(3))["latent"].shape == (3, 2)

@@ -115,6 +115,13 @@ def test_an_environment_without_mujoco_is_refused():
         RobotRenderer(gymnasium.make("Pendulum-v1"))
 
 
+@pytest.mark.parametrize("wrong", [{"seconds": np.nan}, {"seconds": -1.0}, {"max_fps": 0.0}, {"width": 0}])
+def test_a_film_of_no_length_or_size_is_refused(wrong):
+    env = gymnasium.make("Hopper-v5")
+    with pytest.raises(ValueError, match="above zero"):
+        record(env, lambda obs: env.action_space.low, **{"seconds": 1.0} | wrong)
+
+
 def test_the_camera_obeys():
     env = made("HalfCheetah")
     frames = []

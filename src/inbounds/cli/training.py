@@ -18,7 +18,7 @@ import gymnasium
 from inbounds import robots  # its names are imported on first use, and MuJoCo with them
 from inbounds.cli.errors import CommandError, is_ours
 from inbounds.cli.modules import find_modules_here, module_of
-from inbounds.cli.options import Train, quoted
+from inbounds.cli.options import Train, format_seeds, quoted
 from inbounds.cli.progress import TrainingProgress
 from inbounds.cli.tensorboard import TensorBoardWriter
 from inbounds.headless import BackendError
@@ -202,6 +202,8 @@ class _Session:
 def _check_environment(config: TrainConfig) -> None:
     """Raise unless the environment can be made; say what to ask for instead."""
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
+    if (versioned := f"{config.env.removeprefix('inbounds/')}-v5") in TASK_NAMES:
+        raise CommandError(f"{config.env} names no version: ask for {versioned}", 2)
     try:
         if module_of(config.env) is not None:
             if len(parts := config.env.split(":")) != 2 or not all(parts):
@@ -259,9 +261,16 @@ def _changes(config: TrainConfig, stored: dict[str, Any]) -> str:
         different = {"algo": different["algorithm_name"]}
     spelt = {"policy.family": "--policy", "env": "environment"}  # the others as they are called
     return "; ".join(
-        f"{spelt.get(name, '--' + name.replace('_', '-'))} {there} there, {here} here"
+        f"{spelt.get(name, '--' + name.replace('_', '-'))} {_word(name, there)} there, {_word(name, here)} here"
         for name, (there, here) in different.items()
     )
+
+
+def _word(name: str, value: Any) -> str:
+    """Return an option's value as the command line takes it."""
+    if name == "seeds":
+        return format_seeds(value)
+    return " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 @contextlib.contextmanager

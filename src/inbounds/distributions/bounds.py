@@ -12,6 +12,7 @@ Floating point is the enemy near a bound, and three rules answer it:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Self, TypeAlias
 
 import numpy as np
@@ -30,7 +31,7 @@ __all__ = [
     "require_equal_bounds",
 ]
 
-TensorLike: TypeAlias = Tensor | float | npt.NDArray[Any]
+TensorLike: TypeAlias = Tensor | float | npt.NDArray[Any] | Sequence[float]
 
 
 class OpenInterval(constraints.Constraint):
@@ -72,8 +73,8 @@ class BoundedDistribution(Distribution):
 
     Args:
         validate_args: check parameters and values (None: as `torch.distributions` is set, on by default). Inside
-            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor. Code compiled by
-            `torch.compile` checks nothing.
+            `torch.vmap` over the *bounds*, pass False: a check cannot branch on a batched tensor. `torch.compile`
+            switches off the default for all laws of the process, compiled or not: pass True there.
         **parameters: `[...]` each; numbers, tensors or arrays that broadcast together, `low` and `high` among them.
 
     Raises:
@@ -92,10 +93,8 @@ class BoundedDistribution(Distribution):
     def __init__(self, *, validate_args: bool | None = None, **parameters: TensorLike) -> None:
         for name, value in as_parameters(**parameters).items():
             setattr(self, name, value)
-        if torch.compiler.is_compiling():
-            validate_args = (
-                False  # compiled code cannot branch on numbers; torch switches off its own checks, too
-            )
+        if torch.compiler.is_compiling():  # where nothing can branch on numbers, and torch checks nothing
+            validate_args = False
         if validate_args if validate_args is not None else self._validate_args:
             _check_bounds(type(self).__name__, self.low, self.high)
         super().__init__(self.low.shape, validate_args=validate_args)
@@ -254,31 +253,33 @@ def as_parameters(**parameters: TensorLike) -> dict[str, Tensor]:
 
 def _without_numpy(value: TensorLike) -> TensorLike:
     if isinstance(value, np.ndarray):
-        return torch.tensor(value)
+        return torch.as_tensor(np.array(value))  # its own: writable, with no negative strides
     return value.item() if isinstance(value, np.generic) else value  # a number adapts to the others' type
 
 
-def require_bounds(low: TensorLike, high: TensorLike) -> tuple[Tensor, Tensor]:
-    """Return the two bounds as tensors of torch's default type and one shape, checked whatever torch's settings are.
+def require_bounds(
+    low: TensorLike, high: TensorLike, dtype: torch.dtype | None = None
+) -> tuple[Tensor, Tensor]:
+    """Return the two bounds as tensors of their own type and of one shape, checked whatever torch's settings are.
 
     Args:
         low: `[...]` lower bounds.
         high: `[...]` upper bounds.
+        dtype: what actions are computed in; None is torch's default.
 
     Raises:
-        ValueError: some are not finite or not in order, or no floating-point number lies between them.
+        ValueError: some are not finite or not in order, or no number of the dtype lies between them.
 
     Example:
         >>> require_bounds(-1.0, np.inf)  # doctest: +ELLIPSIS
         Traceback (most recent call last):
         ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. An unbounded ...
     """
-    own = (
-        b.detach().clone() if isinstance(b, Tensor) else np.array(b) for b in (low, high)
-    )  # not the caller's memory
-    low, high = (torch.as_tensor(bound, dtype=torch.get_default_dtype()) for bound in own)
-    low, high = as_parameters(low=low, high=high).values()
+    own = [b.detach().clone() if isinstance(b, Tensor) else np.array(b) for b in (low, high)]
+    low, high = as_parameters(low=own[0], high=own[1]).values()
     _check_bounds("action box", low, high)
+    dtype = dtype or torch.get_default_dtype()
+    _check_bounds(f"action box in {dtype}", low.to(dtype), high.to(dtype))
     return low, high
 
 
@@ -297,13 +298,12 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
     if torch.compiler.is_compiling() or not (p._validate_args or q._validate_args):
         return  # compiled code cannot branch on numbers, nor can torch.vmap
     kind = min((p.low.dtype, q.low.dtype), key=lambda kind: torch.finfo(kind).bits)  # 0.1 is not 0.1 in both
-    pairs = ((p.low.to(kind), q.low.to(kind)), (p.high.to(kind), q.high.to(kind)))
-    if any(bool((one != other).any()) for one, other in pairs):
-        raise ValueError(
-            "the KL divergence needs equal bounds, but "
-            f"p has low={p.low.tolist()}, high={p.high.tolist()} and q has low={q.low.tolist()}, "
-            f"high={q.high.tolist()}. Build both from the same action space."
-        )
+    bounds = torch.broadcast_tensors(*(bound.to(kind) for bound in (p.low, p.high, q.low, q.high)))
+    unequal = (bounds[0] != bounds[2]) | (bounds[1] != bounds[3])
+    if bool(unequal.any()):
+        index = tuple(unequal.nonzero()[0].tolist())
+        said = "p has low={}, high={} and q has low={}, high={}".format(*(b[index].item() for b in bounds))
+        raise ValueError(f"KL needs equal bounds, but {said}. Build both from the same action space.")
 
 
 def _open_ends(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:

@@ -24,7 +24,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import torch
 from torch import Tensor
-from torch.distributions import Normal, constraints, kl_divergence, register_kl
+from torch.distributions import Normal, constraints, register_kl
+from torch.distributions.kl import _kl_normal_normal
 from torch.special import log_ndtr
 
 from inbounds.distributions.bounds import BoundedDistribution, TensorLike, require_equal_bounds
@@ -285,4 +286,4 @@ def gaussian_kl_upper_bound(p: ClippedNormal, q: ClippedNormal) -> Tensor:
         (0.4674, 0.5)
     """
     require_equal_bounds(p, q)
-    return kl_divergence(p._normal(), q._normal())
+    return _kl_normal_normal(p._normal(), q._normal())

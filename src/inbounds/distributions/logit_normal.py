@@ -27,7 +27,8 @@ from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
-from torch.distributions import Normal, constraints, kl_divergence, register_kl
+from torch.distributions import Normal, constraints, register_kl
+from torch.distributions.kl import _kl_normal_normal
 from torch.nn.functional import logsigmoid
 
 from inbounds.distributions.bounds import SigmoidMapped, TensorLike, require_equal_bounds
@@ -250,4 +251,4 @@ def _sigmoid_difference(z: Tensor, step: Tensor) -> Tensor:
 def _kl_logit_normal_logit_normal(p: LogitNormal, q: LogitNormal) -> Tensor:
     """Return KL(p‖q) of the latent Normals, in nats, elementwise: exact, as KL is invariant under a bijection."""
     require_equal_bounds(p, q)
-    return kl_divergence(p._normal(), q._normal())
+    return _kl_normal_normal(p._normal(), q._normal())  # found here, for `torch.compile` cannot look it up

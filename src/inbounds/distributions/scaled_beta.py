@@ -119,6 +119,7 @@ class ScaledBeta(SigmoidMapped):
         low, high = given["low"], given["high"]
         towards_high, towards_low = given["mode"] - low, high - given["mode"]
         if validate_args if validate_args is not None else cls._validate_args:
+            cls(1.0, 1.0, low, high, True)  # what is wrong with the bounds is not the mode's fault
             if not torch._is_all_true(
                 (towards_high >= 0) & (towards_low >= 0)
             ):  # as torch checks, also under vmap

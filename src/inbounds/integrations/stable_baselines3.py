@@ -1,9 +1,9 @@
-r"""The logit-normal as a policy of stable-baselines3: PPO, A2C, and sb3-contrib's TRPO take it by name of its class.
+r"""The logit-normal as a policy of stable-baselines3: PPO, A2C, and sb3-contrib's TRPO take the class itself.
 
     model = PPO(LogitNormalPolicy, env)
 
-The peer's own Gaussian draws an action in the *box's units* and lets the environment clip it; its buffer keeps what
-was drawn. Here what is drawn, kept and scored is the latent z ~ N(μ, σ²), and the peer's hook for squashed policies
+The peer's own Gaussian draws an action in the *box's units*; its buffer keeps what was drawn, and the environment gets
+it clipped. Here what is drawn, kept and scored is the latent z ~ N(μ, σ²), and the peer's hook for squashed policies
 (`unscale_action`) makes the action low + (high − low) · sigmoid(z) of it on the way into the environment. So a
 saturated action is scored exactly, its density cancels in every ratio, and an asymmetric box needs no wrapper.
 """
@@ -189,7 +189,7 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         The same model.
 
     Raises:
-        ValueError: a policy of another kind, or a std out of reach.
+        ValueError: a policy of another kind or one that has been trained, or a std out of reach.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -203,6 +203,11 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         raise ValueError(
             f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
         )
+    if model.num_timesteps:
+        raise ValueError(
+            f"quiet_start is for an untrained policy, and this one has learned from {model.num_timesteps} steps: "
+            "call it before `learn`, on a new model"
+        )
     box: Any = model.action_space
     low, high = require_bounds(box.low.reshape(-1), box.high.reshape(-1))
     with torch.no_grad():
@@ -210,7 +215,10 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
             policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))
             policy.action_net.bias.zero_()
         else:
-            policy.log_std.copy_(((high - low) / 2 * quiet_scale(ClippedNormal, std)).log())
+            half, weight = (high - low) / 2, policy.action_net.weight
+            policy.log_std.copy_((half * quiet_scale(ClippedNormal, std)).log())
             policy.action_net.bias.copy_((high + low) / 2)
-            policy.action_net.weight.mul_(((high - low) / 2)[:, None])
+            if not getattr(policy, "_is_scaled", False):  # a second call sets another std alone
+                weight.mul_(half[:, None].to(weight))
+                policy._is_scaled = True
     return model

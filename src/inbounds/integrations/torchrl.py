@@ -116,7 +116,7 @@ def bounded_actor(
     law: type[LogitNormal | ScaledBeta],
     low: TensorLike,
     high: TensorLike,
-    in_keys: Sequence[str] = ("observation",),
+    in_keys: Sequence[str] | str = ("observation",),
 ) -> tuple[ProbabilisticActor, TensorDictSequential]:
     """Return a policy with bounded actions, once for the loss and once for the environment; they share the network.
 
@@ -133,8 +133,8 @@ def bounded_actor(
         `set_exploration_type` says otherwise (TorchRL's own actors act without noise then).
 
     Raises:
-        ValueError: another law, or bounds that are not finite, not in order, or too close for a number between them;
-            when it acts, a network with another number of outputs.
+        ValueError: another law, or bounds that are not finite, not in order, too close for a number of the network's
+            type between them, or of several axes; when it acts, a network with another number of outputs.
 
     Example:
         >>> from tensordict import TensorDict
@@ -147,11 +147,17 @@ def bounded_actor(
     """
     if law not in PARAMETERS:
         raise ValueError(f"bounded_actor knows the laws LogitNormal and ScaledBeta, not {law}")
-    low, high = require_bounds(low, high)  # once: TorchRL switches off every later check
-    names = PARAMETERS[law]
+    first = next(network.parameters(), torch.empty(0))
+    low, high = require_bounds(low, high, first.dtype)  # once: TorchRL switches off every later check
+    if low.dim() > 1:
+        raise ValueError(
+            f"the bounds have the shape {list(low.shape)}, and an action is a vector: flatten the box with "
+            "gymnasium.wrappers.TransformAction, and give bounds of the shape [A]"
+        )
+    names, in_keys = PARAMETERS[law], [in_keys] if isinstance(in_keys, str) else list(in_keys)
 
     actor = ProbabilisticActor(
-        TensorDictModule(network, in_keys=list(in_keys), out_keys=list(names)),
+        TensorDictModule(network, in_keys=in_keys, out_keys=list(names)),
         in_keys=list(names),
         out_keys=["latent"],
         distribution_class=_latents,
@@ -213,7 +219,7 @@ def quiet_actor(
     low: TensorLike,
     high: TensorLike,
     std: float = 0.4,
-    in_keys: Sequence[str] = ("observation",),
+    in_keys: Sequence[str] | str = ("observation",),
 ) -> tuple[ProbabilisticActor, TensorDictSequential]:
     """Return `bounded_actor` on a body, with a last layer that starts quietly, as *Which policy?* recommends.
 
@@ -262,8 +268,12 @@ def quiet_actor(
             )
         head = NormalParamExtractor(scale_mapping=f"biased_softplus_{scale}")
     like = next(body.parameters(), torch.empty(0))
-    outputs = 2 * require_bounds(low, high)[0].numel()
-    last = nn.Linear(features, outputs, device=like.device, dtype=like.dtype)
+    box = require_bounds(low, high, like.dtype)[0]
+    if box.dim() == 0:
+        raise ValueError(
+            "the bounds are numbers, which do not say how many components an action has: give the [A] of each"
+        )
+    last = nn.Linear(features, 2 * box.numel(), device=like.device, dtype=like.dtype)
     nn.init.orthogonal_(last.weight, gain=0.01)
     nn.init.zeros_(last.bias)
     return bounded_actor(_Headed(body, last, head), law, low, high, in_keys)

@@ -11,7 +11,7 @@ from inbounds.learning.networks.perceptron import Mlp, SeedLinear, mlp
 from inbounds.learning.policy_gradient import PolicyGradientConfig
 from inbounds.learning.ppo import PPOConfig
 from inbounds.learning.rollout import Collector, Rollout
-from inbounds.learning.storage.run_store import load_policies, load_policy, policies_of, read_curves, save_run
+from inbounds.learning.storage.run_store import config_of, load_policies, load_policy, read_curves, save_run
 from inbounds.learning.storage.trained_policy import TrainedPolicy
 from inbounds.learning.training import DivergedSeedWarning, Trainer, prepare, train
 from inbounds.learning.trpo import TRPOConfig
@@ -37,13 +37,13 @@ __all__ = [
     "TrainConfig",
     "TrainedPolicy",
     "Trainer",
+    "config_of",
     "executed_std",
     "gae",
     "load_policies",
     "load_policy",
     "mlp",
     "normalize_advantage",
-    "policies_of",
     "prepare",
     "preset",
     "read_curves",

@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # numba is an extra
 
 @dataclass(frozen=True)
 class PolicyGradientConfig:
-    """Every number of REINFORCE with a baseline; the defaults are those of the preset `common`.
+    """Every number of REINFORCE with a baseline.
 
     Example:
         >>> PolicyGradientConfig(gae_lambda=0.95).policy_learning_rate

@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # numba is an extra
 
 @dataclass(frozen=True)
 class PPOConfig:
-    """Every number of PPO; the defaults are those of the preset `common`.
+    """Every number of PPO.
 
     Example:
         >>> PPOConfig(horizon=1024).minibatch_size

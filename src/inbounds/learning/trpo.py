@@ -46,7 +46,7 @@ _CACHED = 512
 
 @dataclass(frozen=True)
 class TRPOConfig:
-    """Every number of TRPO; the defaults are those of the preset `common`. `TrainConfig` has an example."""
+    """Every number of TRPO. `TrainConfig` has an example."""
 
     horizon: int = 2048
     """T, env steps per seed and epoch."""

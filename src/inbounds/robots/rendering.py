@@ -198,6 +198,7 @@ def record(
         RuntimeError: there is no OpenGL to draw with; the message names the fix.
         TypeError: the environment has no MuJoCo simulation.
         IndexError: there is no robot of that index.
+        ValueError: a film of no length or no size.
 
     Example:
         >>> import gymnasium
@@ -207,6 +208,10 @@ def record(
         ((10, 64, 96, 3), 20.0)
     """
     _simulation(env, index)  # says what is wrong before anything else fails for lack of it
+    if not (0 < seconds < math.inf and max_fps > 0 and width > 0 and height > 0):
+        raise ValueError(
+            f"a film has seconds, max_fps, width and height above zero, got {seconds}, {max_fps}, {width}, {height}"
+        )
     is_vector = hasattr(env, "num_envs")
     step_time = _step_time(env)
     stride = max(1, math.ceil(1 / (max_fps * step_time) - 1e-9))

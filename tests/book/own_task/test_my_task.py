@@ -43,6 +43,18 @@ def test_an_unsound_task_is_stopped_by_its_check(monkeypatch: pytest.MonkeyPatch
         my_task.main(["--seeds", "2", "--epochs", "1"])
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [("--seeds 1", "an interval needs two at least"), ("--policy normal", "invalid choice")],
+)
+def test_what_could_only_fail_after_training_is_refused_before(
+    words: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        my_task.main(words.split())
+    assert said in capsys.readouterr().err
+
+
 def test_no_day_serves_twice() -> None:
     assert not set(my_task.CHOSEN_BY) & set(my_task.TESTED)
     assert np.isclose(my_task.LOW[0], 0)

@@ -24,7 +24,6 @@ from inbounds.learning.storage.run_store import (
     load_checkpoint,
     load_policies,
     load_policy,
-    policies_of,
     read_curves,
     save_policies,
     save_run,
@@ -77,7 +76,7 @@ def test_columns_say_what_they_mean_and_floats_are_split_and_compressed(tmp_path
 def test_policies_come_back_bit_for_bit(family: str, tmp_path: Path) -> None:
     trainer = saved_run(tmp_path, family=family, dtype="float64")
     obs = rng().normal(size=(5, 3))
-    for before, after in zip(policies_of(trainer), load_policies(tmp_path), strict=True):
+    for before, after in zip(trainer.policies, load_policies(tmp_path), strict=True):
         assert before.greedy_choices == after.greedy_choices
         for greedy in before.greedy_choices:
             a, b = (policy.act(obs, greedy, rng(1)) for policy in (before, after))
@@ -254,7 +253,7 @@ def test_another_configuration_in_the_policies_file_is_damage(tmp_path: Path) ->
 def test_an_observation_beyond_single_precision(normalised: bool) -> None:
     """Normalised, it is clipped as any large one; as it is, it would become infinite."""
     config = dataclasses.replace(small_config(seeds=1), normalize_obs=normalised)
-    policy = policies_of(small_run(config))[0]
+    policy = small_run(config).policies[0]
     if normalised:
         assert np.isfinite(policy.act(np.full(3, 1e39))).all()
     else:

@@ -16,7 +16,7 @@ import torch
 import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.run_store import load_policies, policies_of
+from inbounds.learning.storage.run_store import load_policies
 from inbounds.learning.training import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, read_cell, run_cell
 from inbounds.study.running import evaluate, file_checks, one_cell
@@ -92,7 +92,7 @@ def test_the_greedy_return_is_that_of_gymnasium(family: str) -> None:
     for _ in range(10):
         run.epoch()
     env = gymnasium.make("Swimmer-v5")
-    for i, policy in enumerate(policies_of(run.trainer)):
+    for i, policy in enumerate(run.trainer.policies):
         obs, _ = env.reset(seed=int(generator_of(policy.seed, 9).integers(2**31)))
         total = 0.0
         for _ in range(LIMIT):

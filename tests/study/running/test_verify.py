@@ -72,6 +72,12 @@ def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
     ]
 
 
+def test_before_anything_is_finished_nothing_is_wrong(tmp_path: Path) -> None:
+    findings = verify([CELL], folder_in(tmp_path), epochs=1)
+    assert bad(findings) == []
+    assert findings[0].message == "nothing is finished yet"
+
+
 def test_checksums_are_what_sha256sum_reads(folder: StudyFolder) -> None:
     lines = (folder.results / "checksums.txt").read_text().splitlines()
     assert [line.split("  ") for line in lines] == [

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.exercises.checks.environment import complaints
 from inbounds.book.own_task import best_of, compare, constant, greedy, noisy, play
-from inbounds.learning import TrainConfig, preset, train
+from inbounds.learning import FAMILIES, TrainConfig, preset, train
 from inbounds.study.statistics import Estimate
 
 # ---- YOURS: the box in your units, what a policy sees, how long an episode lasts
@@ -104,10 +104,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--policy", default="logit-normal")
+    parser.add_argument("--policy", default="logit-normal", choices=FAMILIES)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--epochs", type=int, default=60)
     asked = parser.parse_args(arguments)
+    if asked.seeds < 2:
+        parser.error(f"--seeds {asked.seeds}: an interval needs two at least")
 
     for check, wrong in complaints(make_envs).items():
         raise SystemExit(f"check {check!r}: {wrong}")

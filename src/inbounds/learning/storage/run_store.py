@@ -133,7 +133,18 @@ def read_curves(run: str | Path) -> pa.Table:
 
 
 def config_of(curves: pa.Table) -> TrainConfig:
-    """Return the configuration of the run that curves from `read_curves` belong to.
+    """Return the configuration of the run that curves belong to.
+
+    Args:
+        curves: from `read_curves`.
+
+    Example:
+        >>> import tempfile
+        >>> from inbounds.learning import preset, save_run, train
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_run(folder, train(preset("common", "Swimmer-v5", seeds=2, epochs=1)))
+        ...     config_of(read_curves(folder)).seeds
+        (0, 1)
 
     Raises:
         ValueError: they are of no run, or another version of the package wrote them, with options that this one does
@@ -143,21 +154,6 @@ def config_of(curves: pa.Table) -> TrainConfig:
 
 
 # ---- policies
-
-
-def policies_of(trainer: Run) -> list[TrainedPolicy]:
-    """Return the policies of a run as it stands, one per seed; later training does not change them.
-
-    Args:
-        trainer: the run.
-
-    Example:
-        >>> from inbounds.learning import preset, train
-        >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
-        >>> policies_of(run)[1].act(np.zeros(8)).shape
-        (2,)
-    """
-    return trainer.policies
 
 
 def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = None) -> None:

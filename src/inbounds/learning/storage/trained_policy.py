@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from torch.distributions import Distribution
 
 from inbounds.learning.config import TrainConfig
@@ -98,12 +98,12 @@ class TrainedPolicy:
         return (*self._policy.family.greedy, "sample")
 
     def act(
-        self, obs: NDArray[Any], greedy: str = "median", rng: np.random.Generator | None = None
+        self, obs: ArrayLike, greedy: str = "median", rng: np.random.Generator | None = None
     ) -> NDArray[Any]:
         """Return actions for observations, both as the environment has them.
 
         Args:
-            obs: `[O]` or `[B, O]`.
+            obs: `[O]` or `[B, O]`, flattened where one observation has several axes.
             greedy: "mean", "median", "mode" or "sample", of `greedy_choices`. Of the first three the median alone is
                 left in place by a change of variables.
             rng: where "sample" draws from; None is a generator seeded by the system.
@@ -131,7 +131,7 @@ class TrainedPolicy:
             action = self._policy.greedy(torch.from_numpy(outputs), greedy)
         return action.reshape(shape)
 
-    def distribution(self, obs: NDArray[Any]) -> Distribution:
+    def distribution(self, obs: ArrayLike) -> Distribution:
         """Return the distribution of the action in each state: its parameters, its density, its samples, in torch.
 
         Args:
@@ -159,13 +159,13 @@ class TrainedPolicy:
         outputs, shape = self._outputs(obs)
         return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], outputs.shape[-1]))
 
-    def _outputs(self, obs: NDArray[Any]) -> tuple[NDArray[Any], tuple[int, ...]]:
+    def _outputs(self, obs: ArrayLike) -> tuple[NDArray[Any], tuple[int, ...]]:
         """Return the network's outputs `[B, 2A]` and the shape that actions for `obs` have."""
-        obs = np.asarray(obs)
-        if obs.ndim not in (1, 2) or obs.shape[-1] != self._network.sizes[0]:
+        obs, size = np.asarray(obs), self._network.sizes[0]
+        if obs.ndim not in (1, 2) or obs.shape[-1] != size:
             raise ValueError(
-                f"observations must have the shape [{self._network.sizes[0]}] or [B, {self._network.sizes[0]}], "
-                f"got {list(obs.shape)}"
+                f"observations must have the shape [{size}] or [B, {size}], got {list(obs.shape)}: flatten what has "
+                f"more axes, by obs.reshape(-1) or obs.reshape(-1, {size})"
             )
         batch = np.atleast_2d(obs)  # [B, O]
         with np.errstate(over="ignore", invalid="ignore"):  # said below

@@ -128,6 +128,8 @@ def check_sums(folder: StudyFolder) -> list[Checked]:
         Checked(name, False, f"not in {CHECKSUMS_FILE}: delete it, or restore the list")
         for name in sorted(found - sums.keys())
     ]
+    if not sums and not found:
+        return [Checked(CHECKSUMS_FILE, True, "nothing is finished yet")]
     good = len(sums) - sum(not finding.ok and finding.subject in sums for finding in findings)
     return [*findings, Checked(CHECKSUMS_FILE, good > 0, f"{good} of {len(sums)} files have their checksums")]
 
