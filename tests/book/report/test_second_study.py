@@ -97,6 +97,15 @@ def test_names_of_columns() -> None:
     }
 
 
+def test_a_comparison_that_waits_for_seeds_has_no_verdict(outcomes: Outcomes) -> None:
+    """Of the table and of the words: an interval without its test is not one that the test did not find."""
+    told = views.secondary_verdicts(outcomes, "σ free or of the state", "gaussian")
+    assert " of 3 robots" in told
+    assert told.endswith("seeds still to be run on 1 (Swimmer)")
+    rows = rows_of(views.secondary_comparisons(outcomes))
+    assert {row[1] for row in rows if row[4:5] == ["waits for seeds"]} == {"Swimmer"}
+
+
 def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> None:
     _, *rows = rows_of(views.secondary_comparisons(outcomes))
     assert {row[1] for row in rows} == {"Hopper", "Ant", "Swimmer"}

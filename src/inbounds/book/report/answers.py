@@ -111,7 +111,7 @@ def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
         'not run yet'
     """
     above, below = _sides(area)
-    return short(final) + (f" (by area on {above} and {below})" if below else "")
+    return short(final) + (f" (by area above on {above}, below on {below})" if below else "")
 
 
 def _sides(rows: Sequence[Evidence]) -> tuple[int, int]:

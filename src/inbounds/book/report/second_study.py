@@ -15,7 +15,7 @@ from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.study_panels import left_out
-from inbounds.book.report.words import HEADS, by_robot
+from inbounds.book.report.words import HEADS, WAITS, by_robot
 from inbounds.study.analysis import estimate
 from inbounds.study.cell import Cell
 from inbounds.study.grid import FREE, SECOND, second_cells
@@ -33,7 +33,7 @@ from inbounds.study.second import (
 )
 from inbounds.study.second.primary import BOUNDED
 from inbounds.study.second.yardsticks import ENDPOINTS
-from inbounds.study.statistics import Estimate
+from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.words import p_value, percent, spoken, verdict
 
 BLOCKS = {
@@ -92,7 +92,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             SHORT[row.law],
             HEADS[row.endpoint],
             spoken(row.difference),
-            row.finding or ("missing" if row.difference is None else "waits for seeds"),
+            row.finding or ("missing" if row.difference is None else WAITS),
             f"±{row.margin:g}",
             p_value(row.p_value),
             p_value(row.p_adjusted),
@@ -131,8 +131,8 @@ def _without_diverged(outcomes: Outcomes, rows: Sequence[PrimaryRow]) -> Iterato
             SHORT[row.law],
             HEADS[row.endpoint],
             spoken(row.difference),
-            row.finding or "waits for seeds",
-            with_them[row.law, row.endpoint, row.robot].finding or "waits for seeds",
+            row.finding or WAITS,
+            with_them[row.law, row.endpoint, row.robot].finding or WAITS,
         ]
         for row in primary(outcomes, without_diverged=True)
         if row.difference is not None
@@ -245,7 +245,7 @@ def secondary_comparisons(outcomes: Outcomes) -> Shown:
             row.robot,
             HEADS[row.endpoint],
             spoken(row.comparison.difference),
-            verdict(row.comparison) if np.isfinite(row.comparison.p_value) else "waits for seeds",
+            _verdict(row.comparison),
             p_value(row.comparison.p_adjusted),
             p_value(row.p_over_everything),
             row.question,
@@ -275,7 +275,12 @@ def secondary_verdicts(outcomes: Outcomes, question: str, family: str, endpoint:
         if (row.question, row.pair.first.family, row.endpoint) == (question, family, endpoint)
         and row.comparison.difference is not None
     ]
-    return by_robot([(row.robot, verdict(row.comparison)) for row in rows])
+    return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
+
+
+def _verdict(comparison: Comparison) -> str:
+    """Return a verdict, which waits where seeds of a side are still to be run."""
+    return verdict(comparison) if np.isfinite(comparison.p_value) else WAITS
 
 
 def engine_check(outcomes: Outcomes) -> Shown:

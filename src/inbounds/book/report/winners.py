@@ -102,6 +102,9 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     )
     if small := sum(map(too_small, here)):
         told += f"; on {small} the difference is too small to matter"
+    areas = [sign(row) for row in of(rows, law=law, algorithm=algorithm, endpoint="area")]
+    if areas:
+        told += f". By the area under the learning curve it is above on {areas.count(1)} and below on {areas.count(-1)}"
     if all(row.study == 2 for row in here):
         return (
             f"{first} In a second study, with fresh seeds and a Gaussian whose σ is the same in every state, "

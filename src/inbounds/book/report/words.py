@@ -42,6 +42,10 @@ def pair_name(contrast: Contrast) -> str:
     return f"{SHORT[contrast.first]} − {SHORT[contrast.second]}"
 
 
+WAITS = "waits for seeds"
+"""The verdict on a difference that a protocol tests when more seeds have run."""
+
+
 def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
     """Return on which robots a difference is found above 0, on which below, and on how many it is not.
 
@@ -51,6 +55,8 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
     Example:
         >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm"), ("Swimmer", "unresolved")])
         'above on 1 of 3 robots (Ant), below on 0, not after Holm on 1, no difference found on 1'
+        >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
+        'above on 0 of 2 robots, below on 1 (Hopper), no difference found on 0, seeds still to be run on 1 (Humanoid)'
         >>> by_robot([])
         'not run yet'
     """
@@ -64,7 +70,10 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
     counts = Counter(verdict for _, verdict in verdicts)
     if counts["not after Holm"]:
         parts.append(f"not after Holm on {counts['not after Holm']}")
-    return f"{', '.join(parts)}, no difference found on {counts['unresolved']}"
+    parts.append(f"no difference found on {counts['unresolved']}")
+    if waiting := [robot for robot, verdict in verdicts if verdict == WAITS]:
+        parts.append(f"seeds still to be run on {len(waiting)} ({', '.join(waiting)})")
+    return ", ".join(parts)
 
 
 def in_words(panels: Mapping[str, Mapping[str, Estimate | None]]) -> str:
