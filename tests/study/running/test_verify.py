@@ -72,10 +72,9 @@ def test_good_results_pass_and_repeat_exactly(folder: StudyFolder) -> None:
     ]
 
 
-def test_before_anything_is_finished_nothing_is_wrong(tmp_path: Path) -> None:
+def test_where_nothing_is_finished_there_is_nothing_to_call_good(tmp_path: Path) -> None:
     findings = verify([CELL], folder_in(tmp_path), epochs=1)
-    assert bad(findings) == []
-    assert findings[0].message == "nothing is finished yet"
+    assert bad(findings) == ["checksums.txt: nothing is finished here: another --results?"]
 
 
 def test_checksums_are_what_sha256sum_reads(folder: StudyFolder) -> None:

@@ -129,7 +129,7 @@ def check_sums(folder: StudyFolder) -> list[Checked]:
         for name in sorted(found - sums.keys())
     ]
     if not sums and not found:
-        return [Checked(CHECKSUMS_FILE, True, "nothing is finished yet")]
+        return [Checked(CHECKSUMS_FILE, False, "nothing is finished here: another --results?")]
     good = len(sums) - sum(not finding.ok and finding.subject in sums for finding in findings)
     return [*findings, Checked(CHECKSUMS_FILE, good > 0, f"{good} of {len(sums)} files have their checksums")]
 
