@@ -1,7 +1,8 @@
 """Where mutants are planted: each in a process of its own, forked from one that has imported the libraries.
 
 A copy of the package carries the mutant, and the new process finds that copy before any other. The standard library's
-fork server does the forking. What it preloads imports nothing of the package, and starts no thread.
+fork server does the forking. What it preloads imports nothing of the package, and starts no thread but that of Arrow's
+allocator, which a fork does without.
 """
 
 import multiprocessing

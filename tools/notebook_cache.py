@@ -70,7 +70,8 @@ def fill(code: str) -> Path:
             keys[path.name] = project.add_nb_to_project(str(path)).pk
     if not keys:
         return cache
-    with ProcessPoolExecutor(AT_ONCE, initializer=_start, initargs=(os.getpid(),)) as pool:
+    at_once = min(AT_ONCE, len(keys))
+    with ProcessPoolExecutor(at_once, initializer=_start, initargs=(os.getpid(),)) as pool:
         running = {pool.submit(_execute, str(cache), key, timeout): name for name, key in keys.items()}
         for count, done in enumerate(as_completed(running), 1):
             done.result()
@@ -83,6 +84,9 @@ def fill(code: str) -> Path:
 
 def _start(parent: int) -> None:
     """Prepare a process that executes: its outputs are for a page, and it ends when its parent does."""
+    import forked_kernels
+
+    forked_kernels.use()
     os.environ["INBOUNDS_BOOK_BUILD"] = "1"
 
     def watch() -> None:

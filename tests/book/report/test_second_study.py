@@ -5,6 +5,8 @@ import re
 import pytest
 
 from inbounds.book.report import second_study as views
+from inbounds.book.report import secondary_tests
+from inbounds.study import second, words
 from inbounds.study.analysis import estimate
 from inbounds.study.grid import SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
@@ -33,7 +35,7 @@ def test_nothing_is_called_missing(tmp_path) -> None:
         views.primary_comparison,
         views.cells,
         views.equal_starts,
-        views.secondary_comparisons,
+        secondary_tests.comparisons,
         views.engine_check,
     ):
         assert "missing" in view(nothing).html
@@ -99,15 +101,26 @@ def test_names_of_columns() -> None:
 
 def test_a_comparison_that_waits_for_seeds_has_no_verdict(outcomes: Outcomes) -> None:
     """Of the table and of the words: an interval without its test is not one that the test did not find."""
-    told = views.secondary_verdicts(outcomes, "σ free or of the state", "gaussian")
+    told = secondary_tests.verdicts(outcomes, "σ free or of the state", "gaussian")
     assert " of 3 robots" in told
     assert told.endswith("seeds still to be run on 1 (Swimmer)")
-    rows = rows_of(views.secondary_comparisons(outcomes))
+    rows = rows_of(secondary_tests.comparisons(outcomes))
     assert {row[1] for row in rows if row[4:5] == ["waits for seeds"]} == {"Swimmer"}
 
 
+def test_a_finding_is_kept_where_the_wider_correction_finds_it(outcomes: Outcomes) -> None:
+    rows = [row for row in second.secondary(outcomes.and_of(second_cells())) if row.endpoint == "final"]
+    for question, family in {(row.question, row.pair.first.family) for row in rows}:
+        of_it = [r for r in rows if (r.question, r.pair.first.family) == (question, family)]
+        told = [r for r in of_it if words.verdict(r.comparison) in ("higher", "lower")]
+        staying = [r for r in told if r.p_over_everything < 0.05]
+        assert secondary_tests.kept(outcomes, [(question, family)]) == (len(staying), len(told))
+    asked = {(row.question, row.pair.first.family) for row in rows}
+    assert 0 < secondary_tests.kept(outcomes, asked)[0] < secondary_tests.kept(outcomes, asked)[1]
+
+
 def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> None:
-    _, *rows = rows_of(views.secondary_comparisons(outcomes))
+    _, *rows = rows_of(secondary_tests.comparisons(outcomes))
     assert {row[1] for row in rows} == {"Hopper", "Ant", "Swimmer"}
     assert {row[-1] for row in rows} == {
         "law, σ of the state",

@@ -82,7 +82,9 @@ def test_the_finding_follows_the_rows() -> None:
     areas = [row("beta", -9, -4), row("beta", 2, 3, robot="Hopper")]
     areas = [dataclasses.replace(each, endpoint="area") for each in areas]
     told = winners.finding("x", [*rows, *areas], "beta", "ppo")
-    assert told.endswith("on none. By the area under the learning curve it is above on 1 and below on 1.")
+    assert told.endswith(
+        "on none. By the area under the learning curve it is above on 1 (found) and below on 1 (found)."
+    )
     fresh = [dataclasses.replace(each, study=2) for each in rows]
     free = "a Gaussian whose σ is the same in every state, both start equally quiet: there the Beta"
     assert free in winners.finding("x", fresh, "beta", "ppo")

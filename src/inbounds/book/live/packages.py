@@ -17,7 +17,6 @@ from pathlib import Path
 from inbounds.book.npm import CACHE, esbuild, made_once
 
 JS = Path(__file__).parent / "js"
-"""The files of a bundle."""
 _PACKAGES = ("@mujoco/mujoco", "three")
 _INPUTS = ("package.json", "package-lock.json", "engine.entry.js", "three.entry.js")
 _AS_CLASSIC_SCRIPT = (

@@ -130,6 +130,12 @@ def outcomes_of_both(first: Outcomes) -> Outcomes:
     return first.and_of(AFTERWARDS).and_of(second_cells())
 
 
+def with_second(outcomes: Outcomes) -> Outcomes:
+    """Return outcomes that know the second study's cells, too."""
+    known = {cell.id for cell in second_cells()} <= outcomes.states.keys()
+    return outcomes if known else outcomes.and_of(second_cells())
+
+
 def laws(outcomes: Outcomes) -> list[Evidence]:
     """Return each bounded law minus a Gaussian that starts equally quiet, wherever there are cells for it.
 

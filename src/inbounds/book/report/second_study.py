@@ -8,17 +8,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
-from inbounds.book.report import html
+from inbounds.book.report import html, secondary_tests
+from inbounds.book.report.equal_start import with_second
 from inbounds.book.report.forests import Bar, of_robots
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.study_panels import left_out
-from inbounds.book.report.words import HEADS, WAITS, by_robot
+from inbounds.book.report.words import HEADS, WAITS, column_name
 from inbounds.study.analysis import estimate
 from inbounds.study.cell import Cell
-from inbounds.study.grid import FREE, SECOND, second_cells
+from inbounds.study.grid import SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
     GAUSSIAN,
@@ -28,13 +27,12 @@ from inbounds.study.second import (
     engines_agree,
     improvement,
     primary,
-    secondary,
     starts,
 )
 from inbounds.study.second.primary import BOUNDED
 from inbounds.study.second.yardsticks import ENDPOINTS
-from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.words import p_value, percent, spoken, verdict
+from inbounds.study.statistics import Estimate
+from inbounds.study.words import p_value, percent, spoken
 
 BLOCKS = {
     "B": "B: equal start, PPO",
@@ -48,22 +46,9 @@ BLOCKS = {
 TOLERANCE = 0.02  # of the executed noise, before the start counts as unequal
 
 
-def column_name(column: Column) -> str:
-    """Return what a column is called within its arm.
-
-    Example:
-        >>> column_name(Column("equal", "ppo", "gaussian", "free-std"))
-        'Gaussian free σ'
-    """
-    free = column.variant == FREE or (column.arm == "steps" and column.family == "gaussian")
-    sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
-    changed = "" if column.variant in ("", FREE) else f", {column.variant.replace('-', ' ', 1)}"
-    return f"{SHORT[column.family]}{sigma}{changed}"
-
-
 def progress(outcomes: Outcomes) -> Shown:
     """Return how many cells of each block are finished."""
-    states = _second(outcomes).states
+    states = with_second(outcomes).states
     counts = {
         BLOCKS[block]: (sum(states[cell.id] == "finished" for cell in cells), len(cells))
         for block, cells in SECOND.items()
@@ -73,7 +58,7 @@ def progress(outcomes: Outcomes) -> Shown:
 
 def primary_comparison(outcomes: Outcomes) -> Shown:
     """Return the primary comparison: a forest of differences in units of the margin, and the 24 tests as a table."""
-    rows = primary(_second(outcomes))
+    rows = primary(with_second(outcomes))
     known = [row for row in rows if row.difference is not None]
     if not known:
         return html.of_study("the primary comparison", NONE_FINISHED)
@@ -111,7 +96,7 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
             of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
         ),
         html.table(caption, head, table, words=(0, 1, 2, 4)),
-        *_without_diverged(_second(outcomes), rows),
+        *_without_diverged(with_second(outcomes), rows),
     )
 
 
@@ -158,7 +143,7 @@ def _bars(rows: Sequence[PrimaryRow]) -> dict[str, list[Bar]]:
 
 def over_robots(outcomes: Outcomes) -> Shown:
     """Return the primary columns over all robots, where they are complete."""
-    found, rows = _second(outcomes), []
+    found, rows = with_second(outcomes), []
     for law in ("gaussian", *BOUNDED):
         column = GAUSSIAN if law == "gaussian" else Column("equal", "ppo", law)
         for endpoint, name in ENDPOINTS.items():
@@ -175,7 +160,7 @@ def over_robots(outcomes: Outcomes) -> Shown:
 
 def cells(outcomes: Outcomes) -> Shown:
     """Return what each finished cell earned: final return, area, and the greedy return, which decides nothing."""
-    found = _second(outcomes)
+    found = with_second(outcomes)
     rows = [
         [
             cell.robot,
@@ -212,7 +197,7 @@ def _failed(cell: Cell, start: Mapping[str, float] | None) -> bool:
 
 def equal_starts(outcomes: Outcomes) -> Shown:
     """Return the manipulation check: what each column does before training, and whether the start is equal."""
-    found = _second(outcomes)
+    found = with_second(outcomes)
     rows = []
     for cell in second_cells():
         column = _column_of(cell)
@@ -237,55 +222,9 @@ def equal_starts(outcomes: Outcomes) -> Shown:
     return html.of_study("the manipulation check", html.table(caption, head, rows, words=(0, 1, 6)))
 
 
-def secondary_comparisons(outcomes: Outcomes) -> Shown:
-    """Return the secondary tests whose cells are finished, as a table."""
-    rows = [
-        [
-            f"{row.pair.first.algorithm.upper()}: {column_name(row.pair.first)} − {column_name(row.pair.second)}",
-            row.robot,
-            HEADS[row.endpoint],
-            spoken(row.comparison.difference),
-            _verdict(row.comparison),
-            p_value(row.comparison.p_adjusted),
-            p_value(row.p_over_everything),
-            row.question,
-        ]
-        for row in secondary(_second(outcomes))
-        if row.comparison.difference is not None
-    ]
-    if not rows:
-        return html.of_study("the secondary comparisons", NONE_FINISHED)
-    head = ["difference", "robot", "endpoint", "", "", "p, Holm over robots", "over everything", "question"]
-    caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
-    return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
-
-
-def secondary_verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "final") -> str:
-    """Return on which robots a secondary comparison finds its first side above the second, and below.
-
-    Args:
-        outcomes: of either study.
-        question: a key of `inbounds.study.second.secondary.PAIRS`.
-        family: of the first side.
-        endpoint: final or area.
-    """
-    rows = [
-        row
-        for row in secondary(_second(outcomes))
-        if (row.question, row.pair.first.family, row.endpoint) == (question, family, endpoint)
-        and row.comparison.difference is not None
-    ]
-    return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
-
-
-def _verdict(comparison: Comparison) -> str:
-    """Return a verdict, which waits where seeds of a side are still to be run."""
-    return verdict(comparison) if np.isfinite(comparison.p_value) else WAITS
-
-
 def engine_check(outcomes: Outcomes) -> Shown:
     """Return whether the compiled engine's cells are equivalent to their twins of the first study."""
-    agreed, wider = engines_agree(_second(outcomes)), engines_agree(_second(outcomes), level=0.025)
+    agreed, wider = engines_agree(with_second(outcomes)), engines_agree(with_second(outcomes), level=0.025)
     if not agreed:
         return html.of_study("the two engines", NONE_FINISHED)
 
@@ -327,13 +266,7 @@ def second_study(outcomes: Outcomes) -> Iterator[str]:
         ("Over all robots", over_robots),
         ("Before training", equal_starts),
         ("The two engines", engine_check),
-        ("Secondary comparisons", secondary_comparisons),
+        ("Secondary comparisons", secondary_tests.comparisons),
     ):
         yield html.heading(title, 3)
         yield from view(outcomes).parts
-
-
-def _second(outcomes: Outcomes) -> Outcomes:
-    """Return outcomes that know the second study's cells, too."""
-    known = {cell.id for cell in second_cells()} <= outcomes.states.keys()
-    return outcomes if known else outcomes.and_of(second_cells())

@@ -95,22 +95,35 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     first = f"From the usual starts, under {algorithm.upper()}, the {name} is found {as_they_come}."
     if not here:
         return f"{first} From an equally quiet start the two were not compared yet."
-    above, below = ([row for row in here if sign(row) == way] for way in (1, -1))
+    above, below = _sides(here)
     told = (
         f"the {name} ends above on {_of(len(above), len(here))}{in_brackets(above)} "
-        f"and below on {_none(len(below))}{in_brackets(below)}"
+        f"and below on {_none(len(below))}{in_brackets(below)}{_small(here)}"
     )
-    if small := sum(map(too_small, here)):
-        told += f"; on {small} the difference is too small to matter"
-    areas = [sign(row) for row in of(rows, law=law, algorithm=algorithm, endpoint="area")]
-    if areas:
-        told += f". By the area under the learning curve it is above on {areas.count(1)} and below on {areas.count(-1)}"
+    if areas := of(rows, law=law, algorithm=algorithm, endpoint="area"):
+        above, below = _sides(areas)
+        told += (
+            f". By the area under the learning curve it is above on {_none(len(above))}{in_brackets(above)} "
+            f"and below on {_none(len(below))}{in_brackets(below)}{_small(areas)}"
+        )
     if all(row.study == 2 for row in here):
         return (
             f"{first} In a second study, with fresh seeds and a Gaussian whose σ is the same in every state, "
             f"both start equally quiet: there {told}."
         )
     return f"{first} When both start equally quiet, {told}."
+
+
+def _sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
+    """Return the differences above 0 and those below."""
+    above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
+    return above, below
+
+
+def _small(rows: Sequence[Evidence]) -> str:
+    """Return on how many robots a difference is too small to matter; nothing for none."""
+    count = sum(map(too_small, rows))
+    return f"; on {count} the difference is too small to matter" if count else ""
 
 
 def by_test(words: Sequence[str]) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report.study_figures import SHORT
 from inbounds.study.analysis import Contrast
+from inbounds.study.grid import FREE
+from inbounds.study.outcomes import Column
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import number
 
@@ -40,6 +42,19 @@ def title_of(arm: str, algorithm: str) -> str:
 def pair_name(contrast: Contrast) -> str:
     """Return what is compared, as a difference."""
     return f"{SHORT[contrast.first]} − {SHORT[contrast.second]}"
+
+
+def column_name(column: Column) -> str:
+    """Return what a column is called within its arm.
+
+    Example:
+        >>> column_name(Column("equal", "ppo", "gaussian", "free-std"))
+        'Gaussian free σ'
+    """
+    free = column.variant == FREE or (column.arm == "steps" and column.family == "gaussian")
+    sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
+    changed = "" if column.variant in ("", FREE) else f", {column.variant.replace('-', ' ', 1)}"
+    return f"{SHORT[column.family]}{sigma}{changed}"
 
 
 WAITS = "waits for seeds"

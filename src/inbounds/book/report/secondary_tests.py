@@ -1,0 +1,84 @@
+"""The second study's secondary tests: their table, and what one of them finds, in words.
+
+Nothing here is confirmed or refuted (`results/PROTOCOL-2.md`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from inbounds.book.report import html
+from inbounds.book.report.equal_start import with_second
+from inbounds.book.report.html import NONE_FINISHED, Shown
+from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name
+from inbounds.study.outcomes import Outcomes
+from inbounds.study.second import SecondaryRow, secondary
+from inbounds.study.statistics import Comparison
+from inbounds.study.statistics.settings import SIGNIFICANCE
+from inbounds.study.words import p_value, spoken, verdict
+
+
+def comparisons(outcomes: Outcomes) -> Shown:
+    """Return the secondary tests whose cells are finished, as a table."""
+    rows = [
+        [
+            f"{row.pair.first.algorithm.upper()}: {column_name(row.pair.first)} − {column_name(row.pair.second)}",
+            row.robot,
+            HEADS[row.endpoint],
+            spoken(row.comparison.difference),
+            _verdict(row.comparison),
+            p_value(row.comparison.p_adjusted),
+            p_value(row.p_over_everything),
+            row.question,
+        ]
+        for row in secondary(with_second(outcomes))
+        if row.comparison.difference is not None
+    ]
+    if not rows:
+        return html.of_study("the secondary comparisons", NONE_FINISHED)
+    head = ["difference", "robot", "endpoint", "", "", "p, Holm over robots", "over everything", "question"]
+    caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
+    return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
+
+
+def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "final") -> str:
+    """Return on which robots a secondary comparison finds its first side above the second, and below.
+
+    Args:
+        outcomes: of either study.
+        question: a key of `inbounds.study.second.secondary.PAIRS`.
+        family: of the first side.
+        endpoint: final or area.
+    """
+    rows = _asked(outcomes, question, family, endpoint)
+    return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
+
+
+def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str = "final") -> tuple[int, int]:
+    """Return how many findings stay were all secondary tests corrected together, and how many there are.
+
+    Args:
+        outcomes: of either study.
+        asked: question and family of each comparison, as for `verdicts`.
+        endpoint: final or area.
+    """
+    rows = [row for question, family in asked for row in _asked(outcomes, question, family, endpoint)]
+    found = [row for row in rows if _verdict(row.comparison) in ("higher", "lower")]
+    return sum(row.p_over_everything < SIGNIFICANCE for row in found), len(found)
+
+
+def _asked(outcomes: Outcomes, question: str, family: str, endpoint: str) -> list[SecondaryRow]:
+    """Return what is finished of a comparison, robot by robot."""
+    return [
+        row
+        for row in secondary(with_second(outcomes))
+        if (row.question, row.pair.first.family, row.endpoint) == (question, family, endpoint)
+        and row.comparison.difference is not None
+    ]
+
+
+def _verdict(comparison: Comparison) -> str:
+    """Return a verdict, which waits where seeds of a side are still to be run."""
+    return verdict(comparison) if np.isfinite(comparison.p_value) else WAITS
