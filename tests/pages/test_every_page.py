@@ -156,6 +156,12 @@ def test_no_formula_in_a_line_of_text_scrolls(visit: Visit) -> None:
     assert visit.page.eval_on_selector_all("article span.math", scrolling) == []
 
 
+def test_a_formula_in_a_line_of_its_own_fits_on_a_desk(visit: Visit) -> None:
+    wide = """nodes => nodes.filter((node) => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1)
+      .map((node) => node.textContent)"""
+    assert visit.page.eval_on_selector_all("article mjx-container[display]", wide) == []
+
+
 @pytest.mark.usefixtures("width")
 def test_formulas_in_text_are_not_cut_off(visit: Visit) -> None:
     """Nothing but the page's own column bounds them, and they fit in it."""

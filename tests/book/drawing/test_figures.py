@@ -128,6 +128,21 @@ def test_show_wants_a_sentence(alt: str) -> None:
         figures.show(Figure(), alt)
 
 
+@pytest.mark.parametrize("where", ["set_title", "set_xlabel", "set_ylabel"])
+def test_a_label_that_is_cut_off_is_refused(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def figure(label: str) -> Figure:
+        fig = Figure(figsize=(3, 2), layout="constrained")
+        getattr(fig.subplots(), where)(label)
+        return fig
+
+    monkeypatch.setattr("IPython.display.display", lambda *_, **__: None)
+    figures.show(figure("short"), "A figure whose label fits.")
+    with pytest.raises(ValueError, match=r"a label as long as this.*break its line"):
+        figures.show(
+            figure("a label as long as this is wider than three inches"), "A figure whose label does not."
+        )
+
+
 @pytest.mark.parametrize("building", ["0", "1"])
 def test_alt_text_reaches_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Any, building: str) -> None:
     """MyST-NB's own renderer, with the plugin, writes the alt text and leaves other outputs alone."""

@@ -90,7 +90,7 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
         colors: at most so many in the picture; 0 is as many as it has.
 
     Raises:
-        ValueError: the alt text says less than a sentence would.
+        ValueError: the alt text says less than a sentence would, or a label is cut off at the figure's edge.
     """
     import matplotlib.pyplot as plt
 
@@ -99,10 +99,27 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
             f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
         )
     drawn = png_bytes(fig)
+    if cut := _cut_off(fig):
+        raise ValueError(
+            f"cut off at the figure's edge: {'; '.join(cut)}. Shorten the text, or break its line"
+        )
     png = base64.b64encode(_with_few_colors(drawn, colors) if colors else drawn).decode("ascii")
     width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
     plt.close(fig)
     return png, width
+
+
+def _cut_off(fig: Figure) -> list[str]:
+    """Return which titles and labels of a figure reach beyond its edge."""
+    fig.draw_without_rendering()
+    of_axes = [text for ax in fig.axes for text in (ax.title, ax.xaxis.label, ax.yaxis.label)]
+    page, cut = fig.bbox, []
+    for text in (*of_axes, *fig.texts):
+        box = text.get_window_extent()
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        if text.get_visible() and text.get_text().strip() and not inside:
+            cut.append(repr(text.get_text()))
+    return cut
 
 
 def show(fig: Figure, alt: str) -> None:
@@ -117,7 +134,7 @@ def show(fig: Figure, alt: str) -> None:
             Numbers that vary from machine to machine have no place in it.
 
     Raises:
-        ValueError: If the alt text says less than a sentence would.
+        ValueError: If the alt text says less than a sentence would, or a label is cut off at the figure's edge.
 
     Example:
         >>> import matplotlib.pyplot as plt

@@ -145,7 +145,7 @@ def forest(
                 ax.plot([low, high], [place, place], color=look.color, linewidth=2, linestyle="-")
                 face = "white" if bar.hollow else look.color
                 ax.plot(value, place, look.marker, color=look.color, markerfacecolor=face, markersize=7)
-            ax.set_title(textwrap.fill(title, 22) if narrow else title)
+            ax.set_title(textwrap.fill(title, 22 if narrow else 26))
             ax.grid(visible=False, axis="y")
         first = axes[0, 0]
         first.set_yticks(range(len(groups)), groups)

@@ -25,15 +25,34 @@ const input = new TeX({
 const output = new CHTML({ fontURL: fonts, adaptiveCSS: false });
 const page = mathjax.document("", { InputJax: input, OutputJax: output });
 
-/* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space behind them. */
+/* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space before what
+   follows, which moves behind the operator here, lest a new line begin with it. A short formula stays whole, and so does what stands
+   in brackets, but on a phone (book.css). */
 const OPERATORS = ["mjx-mo", "mjx-texatom"];
 const SPACES = ["3", "4"];
+const SHORT = 8;
+const OPENING = ["28", "5B", "7B"];
+const CLOSING = ["29", "5D", "7D"];
+const bracket = (part) => {
+  /* Of a bracket with an exponent the bracket comes first. */
+  if (["mjx-msup", "mjx-msub", "mjx-msubsup"].includes(adaptor.kind(part))) return bracket(adaptor.firstChild(part));
+  const character = adaptor.kind(part) === "mjx-mo" && adaptor.firstChild(part);
+  const code = character && (adaptor.getAttribute(character, "class") ?? "").match(/mjx-c([0-9A-F]+)/)?.[1];
+  return OPENING.includes(code) ? 1 : CLOSING.includes(code) ? -1 : 0;
+};
 const allowBreaks = (container) => {
   const parts = [...adaptor.childNodes(adaptor.firstChild(container))];
+  if (parts.length <= SHORT) return;
+  const spaces = parts.map((part) => adaptor.getAttribute(part, "space"));
+  const isOperator = (i) => OPERATORS.includes(adaptor.kind(parts[i])) && (i === 0 || SPACES.includes(spaces[i]));
+  let depth = 0;
   parts.forEach((part, i) => {
-    if (i > 0 && OPERATORS.includes(adaptor.kind(parts[i - 1])) && SPACES.includes(adaptor.getAttribute(part, "space"))) {
-      adaptor.insert(adaptor.node("wbr"), part);
+    if (i > 0 && isOperator(i - 1) && SPACES.includes(spaces[i])) {
+      adaptor.removeAttribute(part, "space");
+      adaptor.setAttribute(parts[i - 1], "data-behind", spaces[i]);
+      adaptor.insert(adaptor.node("wbr", depth > 0 ? { class: "in-brackets" } : {}), part);
     }
+    depth = Math.max(0, depth + bracket(part));
   });
 };
 
