@@ -94,3 +94,16 @@ def test_who_is_ended_leaves_no_process(tree: Path) -> None:
     while any(there(each) for each in begun):
         assert time.monotonic() < deadline, "a process outlives the one that started it"
         time.sleep(0.1)
+
+
+def test_a_kernel_that_has_ended_by_itself_needs_no_signal() -> None:
+    """As one that was asked to shut down may have; in a process of its own, since it has one fork server."""
+    code = (
+        "import forked_kernels, sys; kernel = forked_kernels.ForkedKernel([sys.executable, '-m', 'colorsys'], {}, '.');"
+        "print(kernel.wait(), kernel.poll(), kernel.send_signal(15))"
+    )
+    environment = os.environ | {"PYTHONPATH": str(Path(notebook_cache.__file__).parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "0 0 None\n", done.stderr

@@ -9,6 +9,7 @@ Two libraries are not among them: with EGL the import of MuJoCo opens the displa
 and Arrow's allocator starts a thread.
 """
 
+import contextlib
 import multiprocessing
 import os
 import runpy
@@ -72,8 +73,9 @@ class ForkedKernel:
         return self.process.exitcode
 
     def send_signal(self, number: int) -> None:
-        """Send it a signal."""
-        os.kill(self.pid, number)
+        """Send it a signal; one that has ended by itself needs none."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, number)
 
 
 class ForkedProvisioner(LocalProvisioner):

@@ -136,6 +136,8 @@ def test_a_label_that_is_cut_off_is_refused(where: str, monkeypatch: pytest.Monk
         return fig
 
     monkeypatch.setattr("IPython.display.display", lambda *_, **__: None)
+    figures.show(figure("a label as long as this is wider than three inches"), "A figure of somebody's own.")
+    monkeypatch.setenv("INBOUNDS_BOOK_BUILD", "1")
     figures.show(figure("short"), "A figure whose label fits.")
     with pytest.raises(ValueError, match=r"a label as long as this.*break its line"):
         figures.show(

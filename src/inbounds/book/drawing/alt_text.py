@@ -90,7 +90,8 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
         colors: at most so many in the picture; 0 is as many as it has.
 
     Raises:
-        ValueError: the alt text says less than a sentence would, or a label is cut off at the figure's edge.
+        ValueError: the alt text says less than a sentence would, or, in the book's build, a label is cut off at the
+            figure's edge.
     """
     import matplotlib.pyplot as plt
 
@@ -99,7 +100,7 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
             f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
         )
     drawn = png_bytes(fig)
-    if cut := _cut_off(fig):
+    if builds_the_book() and (cut := _cut_off(fig)):
         raise ValueError(
             f"cut off at the figure's edge: {'; '.join(cut)}. Shorten the text, or break its line"
         )
@@ -134,7 +135,8 @@ def show(fig: Figure, alt: str) -> None:
             Numbers that vary from machine to machine have no place in it.
 
     Raises:
-        ValueError: If the alt text says less than a sentence would, or a label is cut off at the figure's edge.
+        ValueError: If the alt text says less than a sentence would, or, in the book's build, a label is cut off at
+            the figure's edge.
 
     Example:
         >>> import matplotlib.pyplot as plt

@@ -52,7 +52,7 @@ def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "fi
         family: of the first side.
         endpoint: final or area.
     """
-    rows = _asked(outcomes, question, family, endpoint)
+    rows = _asked(outcomes, [(question, family)], endpoint)
     return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
 
 
@@ -64,17 +64,18 @@ def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str = "
         asked: question and family of each comparison, as for `verdicts`.
         endpoint: final or area.
     """
-    rows = [row for question, family in asked for row in _asked(outcomes, question, family, endpoint)]
+    rows = _asked(outcomes, asked, endpoint)
     found = [row for row in rows if _verdict(row.comparison) in ("higher", "lower")]
     return sum(row.p_over_everything < SIGNIFICANCE for row in found), len(found)
 
 
-def _asked(outcomes: Outcomes, question: str, family: str, endpoint: str) -> list[SecondaryRow]:
-    """Return what is finished of a comparison, robot by robot."""
+def _asked(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str) -> list[SecondaryRow]:
+    """Return what is finished of comparisons, robot by robot."""
+    wanted = {(question, family, endpoint) for question, family in asked}
     return [
         row
         for row in secondary(with_second(outcomes))
-        if (row.question, row.pair.first.family, row.endpoint) == (question, family, endpoint)
+        if (row.question, row.pair.first.family, row.endpoint) in wanted
         and row.comparison.difference is not None
     ]
 

@@ -96,7 +96,7 @@ def learning_curves(
                 without_scale(ax, "both")
         fig.supylabel(ylabel, fontsize=13)
         for ax in lowest(axes, narrow=narrow):
-            ax.set_xlabel("env steps per seed [millions]", **({"fontsize": SMALL} if narrow else {}))
+            ax.set_xlabel("env steps per seed [millions]", fontsize=SMALL)
         family_legend(fig, families, narrow=narrow)
         drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
         note(fig, "Line", "Band", drawn, ", at each epoch by itself", narrow=narrow)
