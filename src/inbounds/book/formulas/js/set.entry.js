@@ -27,7 +27,7 @@ const page = mathjax.document("", { InputJax: input, OutputJax: output });
 
 /* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space before what
    follows, which moves behind the operator here, lest a new line begin with it. A short formula stays whole, and so does what stands
-   in brackets, but on a phone (book.css). */
+   in brackets, except on a phone (book.css). */
 const OPERATORS = ["mjx-mo", "mjx-texatom"];
 const SPACES = ["3", "4"];
 const SHORT = 8;
@@ -42,7 +42,6 @@ const bracket = (part) => {
 };
 const allowBreaks = (container) => {
   const parts = [...adaptor.childNodes(adaptor.firstChild(container))];
-  if (parts.length <= SHORT) return;
   const spaces = parts.map((part) => adaptor.getAttribute(part, "space"));
   const isOperator = (i) => OPERATORS.includes(adaptor.kind(parts[i])) && (i === 0 || SPACES.includes(spaces[i]));
   let depth = 0;
@@ -50,7 +49,7 @@ const allowBreaks = (container) => {
     if (i > 0 && isOperator(i - 1) && SPACES.includes(spaces[i])) {
       adaptor.removeAttribute(part, "space");
       adaptor.setAttribute(parts[i - 1], "data-behind", spaces[i]);
-      adaptor.insert(adaptor.node("wbr", depth > 0 ? { class: "in-brackets" } : {}), part);
+      adaptor.insert(adaptor.node("wbr", depth > 0 || parts.length <= SHORT ? { class: "on-a-phone" } : {}), part);
     }
     depth = Math.max(0, depth + bracket(part));
   });
