@@ -1,5 +1,6 @@
 """Each notebook is executed once; what failed is executed again; who fills the cache and is ended leaves nothing."""
 
+import importlib.util
 import os
 import re
 import subprocess
@@ -28,6 +29,11 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "notebooks").mkdir()
     (tmp_path / "_config.yml").write_text("execute: {timeout: 60}", encoding="utf8")
     return tmp_path
+
+
+def test_the_libraries_of_kernels_are_there() -> None:
+    """A name that is not is skipped in silence, and every kernel imports it anew."""
+    assert all(importlib.util.find_spec(name) for name in forked_kernels.LIBRARIES)
 
 
 def write(tree: Path, name: str, *sources: str) -> Path:

@@ -35,6 +35,7 @@ PAGES = (
     "notebooks",
     "tests",  # the page of statements shows some
     "tools/build_book.py",
+    "tools/forked_kernels.py",
     "tools/notebook_cache.py",
     "tools/student_copies.py",
     "CITATION.cff",

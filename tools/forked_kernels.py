@@ -1,4 +1,4 @@
-"""Kernels for executing many notebooks: each is forked from one process that has imported the libraries.
+"""Kernels for executing many notebooks: those of one process are forked from a server that has imported the libraries.
 
 A kernel that starts anew spends four seconds on importing what nearly every notebook imports, and one more on an
 orderly end. `use` makes this process's kernels begin as copies of a fork server of the standard library, which has

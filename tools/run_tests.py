@@ -27,7 +27,9 @@ from pathlib import Path
 import notebook_cache
 
 ROOT = notebook_cache.ROOT
-WORKERS = max(2, min(4, os.cpu_count() or 1))  # each takes one core and up to 1.5 GB
+WORKERS = max(
+    3, min(4, os.cpu_count() or 1)
+)  # each takes up to 1.5 GB; of three, one mostly waits for a process
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 MAY_SKIP = "the live robot is not tested here"
 """What `tests/book/live/conftest.py` says of a machine without npm."""

@@ -54,12 +54,21 @@ def test_a_page_has_its_formulas_and_no_script(folder: Path) -> None:
     assert (folder / "notebooks" / "page.html").read_text(encoding="utf8") == before
 
 
-def test_a_short_formula_is_broken_on_a_phone_alone() -> None:
+@pytest.mark.parametrize(
+    ("tex", "breaks"),
+    [
+        ("(1 - a)^m", [True]),
+        (r"x = a\big(b - c\big) + d + e + f", [False, True, False, False, False]),  # large brackets, too
+    ],
+    ids=["a short formula", "within brackets"],
+)
+def test_some_breaks_are_for_a_phone_alone(tex: str, breaks: list[bool]) -> None:
     try:
-        made, _ = formulas.set_all([("(1 - a)^m", False)], {})
+        made, _ = formulas.set_all([(tex, False)], {})
     except NpmError as error:
         pytest.skip(f"formulas are not set here: {error}")
-    assert re.findall("<wbr[^>]*>", made["(1 - a)^m", False]["html"]) == ['<wbr class="on-a-phone">']
+    found = re.findall("<wbr[^>]*>", made[tex, False]["html"])
+    assert ["on-a-phone" in each for each in found] == breaks
 
 
 def test_a_formula_that_is_wrong_stops_the_build(folder: Path) -> None:

@@ -116,9 +116,10 @@ def _cut_off(fig: Figure) -> list[str]:
     of_axes = [text for ax in fig.axes for text in (ax.title, ax.xaxis.label, ax.yaxis.label)]
     page, cut = fig.bbox, []
     for text in (*of_axes, *fig.texts):
+        if not text.get_visible() or not text.get_text().strip():
+            continue
         box = text.get_window_extent()
-        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
-        if text.get_visible() and text.get_text().strip() and not inside:
+        if not (page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1):
             cut.append(repr(text.get_text()))
     return cut
 

@@ -99,8 +99,8 @@ def short(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    above, below = _sides(rows)
-    return f"above on {above} of {len(rows)}, below on {below}"
+    above, below = sides(rows)
+    return f"above on {len(above)} of {len(rows)}, below on {len(below)}"
 
 
 def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
@@ -110,13 +110,19 @@ def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
         >>> in_short([], [])
         'not run yet'
     """
-    above, below = _sides(area)
-    return short(final) + (f" (by area above on {above}, below on {below})" if below else "")
+    above, below = sides(area)
+    return short(final) + (f" (by area above on {len(above)}, below on {len(below)})" if below else "")
 
 
-def _sides(rows: Sequence[Evidence]) -> tuple[int, int]:
-    signs = [sign(row) for row in rows]
-    return signs.count(1), signs.count(-1)
+def sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
+    """Return the differences that are above 0 and those that are below.
+
+    Example:
+        >>> sides([])
+        ([], [])
+    """
+    above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
+    return above, below
 
 
 def in_brackets(rows: Sequence[Evidence]) -> str:

@@ -10,7 +10,7 @@ from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.study_figures import interval_panels
-from inbounds.book.report.words import HEADS
+from inbounds.book.report.words import HEADS, change_name
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
 from inbounds.study.grid import AFTERWARDS, ARMS, Cell
@@ -60,7 +60,7 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
                     "robot": cell.robot,
                     "algorithm": cell.algorithm.upper(),
                     "family": LOOKS[cell.family].label,
-                    "variant": cell.variant,
+                    "change": change_name(cell.variant),
                 }
             )
             rows.append([spoken(estimate) for estimate in found.values()])
@@ -87,8 +87,8 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
     where = f"{title} ({', '.join(shared)})" if shared else title
     caption = f"{where}: changed cell minus cell of comparison."
     first, last = (
-        [n for n in told if n != "variant"],
-        [n for n in told if n == "variant"],
+        [n for n in told if n != "change"],
+        [n for n in told if n == "change"],
     )  # results stay in view
     table = [
         [*(each[name] for name in first), *row, *(each[name] for name in last)]
@@ -113,4 +113,4 @@ def _without_shared(counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[in
 
 def _panel(cell: Cell) -> str:
     """Return the title of a cell's panel: all that tells the group's cells apart but the family."""
-    return f"{cell.robot}, {cell.algorithm.upper()}\n{cell.variant}"
+    return f"{cell.robot}, {cell.algorithm.upper()}\n{change_name(cell.variant)}"

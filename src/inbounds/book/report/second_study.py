@@ -212,12 +212,12 @@ def equal_starts(outcomes: Outcomes) -> Shown:
                 "usual" if asked is None else f"{asked:g}{', failed' if failed else ''}",
                 percent(start["saturation"], 1),
                 f"{start['return']:.0f}".replace("-", "−"),
-                cell.arm,
+                f"{cell.seeds[0]}–{cell.seeds[-1]}",
             ]
         )
     if not rows:
         return html.of_study("the manipulation check", NONE_FINISHED)
-    head = ["robot", "column", "executed noise", "asked for", "at a bound", "first return", "arm"]
+    head = ["robot", "column", "executed noise", "asked for", "at a bound", "first return", "seeds"]
     caption = "Manipulation check: the untrained policies, means over seeds of the first epoch."
     return html.of_study("the manipulation check", html.table(caption, head, rows, words=(0, 1, 6)))
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.drawing.figures import LOOKS, WIDTH
 from inbounds.book.report.equal_start import clear
+from inbounds.book.report.words import change_name
 from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate, difference
@@ -83,12 +84,12 @@ def in_words(cell: Cell) -> str:
 
     Example:
         >>> in_words(Cell("mechanisms", "ppo", "logit-normal", "Hopper", variant="matched-noise"))
-        'PPO, logit-normal, matched noise'
+        'PPO, logit-normal, start at noise 0.4'
     """
-    name, _, value = cell.variant.partition("gamma-")
-    variant = f"γ = {value}" if value else name.replace("-", " ")
     start = {"equal": "equal start", "as-they-come": "usual start, fresh seeds"}.get(cell.arm, "")
-    return ", ".join(filter(None, [cell.algorithm.upper(), NAMES[cell.family], start, variant]))
+    return ", ".join(
+        filter(None, [cell.algorithm.upper(), NAMES[cell.family], start, change_name(cell.variant)])
+    )
 
 
 def _gains(outcome: Outcome) -> dict[str, Estimate]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import in_brackets, of, place_of, sign, too_small
+from inbounds.book.report.answers import in_brackets, of, place_of, sides, sign, too_small
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.book.report.ways_to_act import BOUNDED
@@ -78,7 +78,7 @@ def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
 
 
 def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: str) -> str:
-    """Return the book's finding in two sentences: what a law gains as it comes, and what from an equally quiet start.
+    """Return the book's finding: a sentence on what a law gains as it comes, then what from an equally quiet start.
 
     Args:
         as_they_come: on how many robots the law ends where, as `by_test` says it.
@@ -95,13 +95,13 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     first = f"From the usual starts, under {algorithm.upper()}, the {name} is found {as_they_come}."
     if not here:
         return f"{first} From an equally quiet start the two were not compared yet."
-    above, below = _sides(here)
+    above, below = sides(here)
     told = (
         f"the {name} ends above on {_of(len(above), len(here))}{in_brackets(above)} "
         f"and below on {_none(len(below))}{in_brackets(below)}{_small(here)}"
     )
     if areas := of(rows, law=law, algorithm=algorithm, endpoint="area"):
-        above, below = _sides(areas)
+        above, below = sides(areas)
         told += (
             f". By the area under the learning curve it is above on {_none(len(above))}{in_brackets(above)} "
             f"and below on {_none(len(below))}{in_brackets(below)}{_small(areas)}"
@@ -112,12 +112,6 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
             f"both start equally quiet: there {told}."
         )
     return f"{first} When both start equally quiet, {told}."
-
-
-def _sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
-    """Return the differences above 0 and those below."""
-    above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
-    return above, below
 
 
 def _small(rows: Sequence[Evidence]) -> str:

@@ -25,6 +25,14 @@ ARM_TITLES: Mapping[str, str] = {
     arm: f"Arm {place}: {name}" for place, (arm, name) in enumerate(ARM_NAMES.items(), 1)
 }
 """Arm → its heading."""
+CHANGES: Mapping[str, str] = {
+    "matched-noise": "start at noise 0.4",
+    "loud-noise": "loud start",
+    "raw-cost": "drawn action billed",
+    FREE: "free σ",
+}
+"""Variant → what it changes, where its name does not say it."""
+LETTERS: Mapping[str, str] = {"gamma": "γ", "rate": "step size"}
 HEADS: Mapping[str, str] = {"final": "final return", "area": "area", "greedy": "greedy return"}
 """Endpoint → title of its column."""
 
@@ -53,8 +61,19 @@ def column_name(column: Column) -> str:
     """
     free = column.variant == FREE or (column.arm == "steps" and column.family == "gaussian")
     sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
-    changed = "" if column.variant in ("", FREE) else f", {column.variant.replace('-', ' ', 1)}"
+    changed = "" if column.variant in ("", FREE) else f", {change_name(column.variant)}"
     return f"{SHORT[column.family]}{sigma}{changed}"
+
+
+def change_name(variant: str) -> str:
+    """Return what a cell's variant changes, in words.
+
+    Example:
+        >>> [change_name(variant) for variant in ("matched-noise", "gamma-0.9999", "printed-clip", "")]
+        ['start at noise 0.4', 'γ 0.9999', 'printed clip', '']
+    """
+    word, _, value = variant.partition("-")
+    return CHANGES.get(variant, f"{LETTERS.get(word, word)} {value}".strip())
 
 
 WAITS = "waits for seeds"

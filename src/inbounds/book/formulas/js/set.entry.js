@@ -28,12 +28,16 @@ const page = mathjax.document("", { InputJax: input, OutputJax: output });
 /* TeX breaks a formula in a line of text after a relation or an operator. MathJax 3 does not; it marks both by the space before what
    follows, which moves behind the operator here, lest a new line begin with it. A short formula stays whole, and so does what stands
    in brackets, except on a phone (book.css). */
-const OPERATORS = ["mjx-mo", "mjx-texatom"];
 const SPACES = ["3", "4"];
 const SHORT = 8;
 const OPENING = ["28", "5B", "7B"];
 const CLOSING = ["29", "5D", "7D"];
 const bracket = (part) => {
+  /* A large bracket, such as \big(, stands in an atom of its own. */
+  if (adaptor.kind(part) === "mjx-TeXAtom") {
+    const inner = adaptor.childNodes(part);
+    return inner.length === 1 ? bracket(inner[0]) : 0;
+  }
   /* Of a bracket with an exponent the bracket comes first. */
   if (["mjx-msup", "mjx-msub", "mjx-msubsup"].includes(adaptor.kind(part))) return bracket(adaptor.firstChild(part));
   const character = adaptor.kind(part) === "mjx-mo" && adaptor.firstChild(part);
@@ -43,7 +47,7 @@ const bracket = (part) => {
 const allowBreaks = (container) => {
   const parts = [...adaptor.childNodes(adaptor.firstChild(container))];
   const spaces = parts.map((part) => adaptor.getAttribute(part, "space"));
-  const isOperator = (i) => OPERATORS.includes(adaptor.kind(parts[i])) && (i === 0 || SPACES.includes(spaces[i]));
+  const isOperator = (i) => adaptor.kind(parts[i]) === "mjx-mo" && (i === 0 || SPACES.includes(spaces[i]));
   let depth = 0;
   parts.forEach((part, i) => {
     if (i > 0 && isOperator(i - 1) && SPACES.includes(spaces[i])) {
