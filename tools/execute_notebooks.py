@@ -5,6 +5,7 @@ import sys
 import time
 from pathlib import Path
 
+import forked_kernels
 import nbformat
 from nbclient import NotebookClient
 
@@ -15,6 +16,7 @@ def main() -> int:
     if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
         print("no notebook named: make notebooks NB=notebooks/actions_have_bounds.ipynb")
         return 2
+    forked_kernels.use()
     for name in sys.argv[1:]:
         path, start = Path(name), time.perf_counter()
         notebook = nbformat.read(path, as_version=4)
