@@ -92,7 +92,7 @@ def test_names_of_columns() -> None:
         "Logit-normal",
         "Logit-normal free σ",
         *(
-            f"{law}, rate {r}"
+            f"{law}, step size {r}"
             for law in ("Gaussian free σ", "Beta", "Logit-normal")
             for r in ("0.0001", "0.001")
         ),

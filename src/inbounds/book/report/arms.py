@@ -201,18 +201,22 @@ def _tests(title: str, found: Differences) -> str:
         for c, by in found.items()
         for robot in known
     ]
-    head = ["robot", "difference", *(word for name in HEADS.values() for word in (name, "p, Holm", ""))]
+    head = [
+        "robot",
+        "difference",
+        *(word for name in HEADS.values() for word in (name, "verdict", "p, Holm")),
+    ]
     caption = (
         f"Differences of means ({title}): in brackets "
         f"a {percent(LEVEL)} bootstrap interval; p of a permutation test, corrected over the six robots (Holm). "
         f"Unresolved: the interval contains 0, which is no evidence of equality.{_unfinished(known)}"
     )
-    return html.table(caption, head, rows, words=(0, 1, 4, 7, 10))
+    return html.table(caption, head, rows, words=(0, 1, 3, 6, 9))
 
 
 def _told(comparison: Comparison) -> tuple[str, str, str]:
     p = p_value(comparison.p_adjusted) if comparison.difference else ""
-    return spoken(comparison.difference), p, verdict(comparison)
+    return spoken(comparison.difference), verdict(comparison), p
 
 
 def _means_without_diverged(part: Part) -> str:

@@ -38,7 +38,16 @@ def comparisons(outcomes: Outcomes) -> Shown:
     ]
     if not rows:
         return html.of_study("the secondary comparisons", NONE_FINISHED)
-    head = ["difference", "robot", "endpoint", "", "", "p, Holm over robots", "over everything", "question"]
+    head = [
+        "difference",
+        "robot",
+        "endpoint",
+        "estimate",
+        "verdict",
+        "p, Holm over robots",
+        "over everything",
+        "question",
+    ]
     caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
     return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
 
