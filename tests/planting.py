@@ -5,6 +5,7 @@ fork server does the forking. What it preloads imports nothing of the package, a
 allocator, which a fork does without.
 """
 
+import gc
 import multiprocessing
 import os
 import shutil
@@ -59,6 +60,7 @@ def run_tests(nodes: list[str], folder: Path, seconds: float = 600) -> tuple[int
 
 def _run(nodes: list[str], folder: str, output: str) -> None:
     """Run pytest in the new process, and end it at once: neither threads nor exit handlers may hold it up."""
+    gc.freeze()  # pytest collects garbage four times, and none of it is the libraries'
     file = os.open(output, os.O_WRONLY | os.O_CREAT)
     os.dup2(file, 1)
     os.dup2(file, 2)

@@ -10,6 +10,7 @@ and Arrow's allocator starts a thread.
 """
 
 import contextlib
+import gc
 import multiprocessing
 import os
 import runpy
@@ -94,6 +95,7 @@ class ForkedProvisioner(LocalProvisioner):
 
 def _become(command: list[str], environment: dict[str, str], folder: str) -> None:
     """Turn this new process into the kernel that a command line names (`python -m MODULE ARGUMENT ...`)."""
+    gc.freeze()  # what the libraries have made is no garbage
     os.setsid()  # a group of its own, which is signalled as a whole
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.environ.update(environment)
