@@ -1,5 +1,6 @@
 """The pieces of the compiled update, each beside an oracle from elsewhere."""
 
+import importlib
 import math
 from typing import Any
 
@@ -13,12 +14,15 @@ from scipy import special
 
 from inbounds.learning import RunningNormalizer, normalize_advantage
 from inbounds.learning.families import beta_kernel, clipped_gaussian_kernel
+from inbounds.learning.families.family import Limits
+from inbounds.learning.families.policy import FAMILIES as BY_NAME
 from inbounds.learning.networks import kernels
 from inbounds.learning.networks.compiled_acting import CompiledActing
 from inbounds.learning.networks.kernels import AdamNumbers, Net
 from inbounds.learning.ppo import clipped_surrogate
 from inbounds.learning.updates.kernels import Batch, normalize, surrogate_slope
 from tests.learning.made_up import SHAPES, made_up_networks
+from tests.learning.small import FAMILIES
 
 
 def over(function: Any, x: np.ndarray) -> np.ndarray:
@@ -78,6 +82,28 @@ def test_the_tails_of_the_clipped_normal(t: float) -> None:
         slope = mpmath.exp(-(mpmath.mpf(t) ** 2) / 2 - log_cdf) / mpmath.sqrt(2 * mpmath.pi)
     assert clipped_gaussian_kernel.log_cdf(t) == pytest.approx(float(log_cdf), rel=1e-10)
     assert clipped_gaussian_kernel.log_cdf_slope(t) == pytest.approx(float(slope), rel=1e-9)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_laws_score_and_entropy_are_autograds(family: str) -> None:
+    """Some outputs are beyond the limits, and some latents of the Normals outside the box."""
+    law, kernel = BY_NAME[family].law, importlib.import_module(BY_NAME[family].kernels or "")
+    limits, rng = Limits(log_std_min=-3.0), np.random.default_rng(0)
+    outputs = np.concatenate([rng.normal(0, 1, (2, 40)), rng.uniform(-2, 1.5, (2, 40))])  # [2A, B]
+    outputs[2:, :4] = [[-4.0, 2.0, -3.5, 90.0]] * 2
+    latent = rng.uniform(0.01, 0.99, (2, 40)) if family == "beta" else rng.normal(0, 1.5, (2, 40))
+    x = torch.from_numpy(outputs.T.copy()).requires_grad_()
+    parameters = law.parameters(x, limits)
+    log_prob = law.log_prob(parameters, torch.from_numpy(latent.T.copy()))
+    (score,) = torch.autograd.grad(log_prob.sum(), x, retain_graph=True)
+    (of_entropy,) = torch.autograd.grad(BY_NAME[family].entropy(parameters).sum(), x, allow_unused=True)
+    told = limits.log_std_min, limits.log_std_max, limits.concentration_max
+    found, slope, entropy_slope = np.zeros(40), np.zeros((4, 40)), np.zeros((4, 40))
+    kernel.score(outputs, latent, told, found, slope)
+    kernel.entropy_slope(outputs, told, entropy_slope)
+    np.testing.assert_allclose(found, log_prob.detach(), rtol=1e-9)
+    np.testing.assert_allclose(slope.T, score, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(entropy_slope.T, of_entropy, rtol=1e-9, atol=1e-9)
 
 
 def batch_of(log_prob: np.ndarray, old: np.ndarray, advantage: np.ndarray) -> Batch:
