@@ -7,7 +7,7 @@ import pytest
 
 from inbounds.book.report import answers, winners
 from inbounds.book.report.equal_start import Evidence, grade, laws, outcomes_of_both, quiet_starts
-from inbounds.study.grid import AFTERWARDS, SECOND, select
+from inbounds.study.grid import AFTERWARDS, ROBOTS, SECOND, select
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import Estimate
 from inbounds.study.store import StudyFolder
@@ -137,6 +137,14 @@ def row(law: str, low: float, high: float, robot: str = "Ant") -> Evidence:
 )
 def test_the_first_choice_follows_from_the_numbers(rows: list[Evidence], law: str) -> None:
     assert answers.first_choice(rows) == law
+
+
+def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
+    rows = [row(law, 100, 900, robot) for law in ("beta", "logit-normal") for robot in ROBOTS]
+    rows = [row("logit-normal", -900, -100), *rows]
+    assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
+    assert answers.advice(rows[:-1], "ppo") == "Under PPO no law leads yet: take your library's."
+    assert "no law leads:" in answers.advice([*rows, row("beta", -900, -100)], "ppo")
 
 
 def test_what_is_too_small_to_matter_leads_nowhere() -> None:

@@ -56,19 +56,27 @@ def first_choice(rows: Sequence[Evidence]) -> str:
     return best[0] if len(best) == 1 else ""
 
 
-def advice(algorithm: str, law: str) -> str:
-    """Return the recommendation that follows from a first choice.
+def advice(rows: Sequence[Evidence], algorithm: str) -> str:
+    """Return the recommendation that follows from the first choice, once every law was compared on every robot.
+
+    Args:
+        rows: of both endpoints.
+        algorithm: ppo or trpo.
 
     Example:
-        >>> advice("trpo", "")
-        "Under TRPO no law leads: take your library's."
+        >>> advice([], "trpo")
+        "Under TRPO no law leads yet: take your library's."
     """
-    told = {
-        "": " no law leads: take your library's",
-        "beta": ", try the Beta",
-        "logit-normal": ", try the logit-normal",
-    }
-    return f"Under {algorithm.upper()}{told[law]}."
+    here = of(rows, algorithm=algorithm)
+    if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
+        told = " no law leads yet: take your library's"
+    else:
+        told = {
+            "": " no law leads: take your library's",
+            "beta": ", try the Beta",
+            "logit-normal": ", try the logit-normal",
+        }[first_choice(here)]
+    return f"Under {algorithm.upper()}{told}."
 
 
 def counted(rows: Sequence[Evidence]) -> str:
