@@ -158,10 +158,10 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     profiles = [alt for alt in page.images if alt.startswith("Performance profiles")]
     assert len(profiles) == 2
     # What all rows share is in the caption.
-    changes = page.table("Entropy bonus (Hopper, PPO, entropy-0): changed cell minus")
+    changes = page.table("Entropy bonus (Hopper, PPO, entropy 0): changed cell minus")
     assert changes[0][:2] == ["family", "final return"]
     assert [line[0] for line in changes[1:]] == ["Gaussian, clipped", "Beta", "Logit-normal"]
-    assert {"Hopper, entropy-0: 3 of 3", "HalfCheetah, entropy-0: 0 of 3"} <= set(page.items)
+    assert {"Hopper, entropy 0: 3 of 3", "HalfCheetah, entropy 0: 0 of 3"} <= set(page.items)
     later = page.table("Initial noise, asked afterwards: changed cell minus")
     assert [line[:2] for line in later[1:]] == [["Ant", "PPO"]]  # TRPO: nothing to compare with
     (found,) = outcomes.and_of(select(["afterwards-ant-ppo-*"])).finished.keys() - outcomes.finished.keys()
