@@ -27,9 +27,8 @@ from pathlib import Path
 import notebook_cache
 
 ROOT = notebook_cache.ROOT
-WORKERS = max(
-    3, min(4, os.cpu_count() or 1)
-)  # each takes up to 1.5 GB; of three, one mostly waits for a process
+# Each takes up to 1.5 GB. Three also where there are two cores: tests wait for processes that they start.
+WORKERS = max(3, min(4, os.cpu_count() or 1))
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 MAY_SKIP = "the live robot is not tested here"
 """What `tests/book/live/conftest.py` says of a machine without npm."""

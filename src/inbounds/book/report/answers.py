@@ -88,7 +88,7 @@ def counted(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
+    above, below = sides(rows)
     small = sum(map(too_small, rows))
     robots = f"{len(rows)} robot{'' if len(rows) == 1 else 's'}"
     refuted = f", too small to matter on {small}" if small else ""
