@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 NB ?= $(wildcard notebooks/*.ipynb)
 PORT ?= 8000
 
-.PHONY: help setup book quick test check format notebooks pages lighthouse pdf slides serve lab bench dist clean distclean
+.PHONY: help setup book quick test mutants check format notebooks pages lighthouse pdf slides serve lab bench dist clean distclean
 
 help:  ## list these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -26,6 +26,9 @@ quick: setup  ## format, lint, types and the fast tests  (a few minutes; while y
 
 test: setup  ## pytest on the package and the book, nbval on the notebooks
 	@$(PY) tools/run_tests.py
+
+mutants: setup  ## break the package on purpose, a line at a time: does the test that should notice notice?
+	@$(PY) tools/run_tests.py --mutants
 
 check: setup  ## format, lint, types, doctests, stored notebooks, budgets
 	@$(PY) tools/run_checks.py

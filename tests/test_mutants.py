@@ -1,4 +1,4 @@
-"""Each planted error is noticed by the test that claims to notice it."""
+"""Each planted error is noticed by the test that claims to notice it (`make mutants`)."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,19 +29,19 @@ def test_the_snippet_is_still_there(mutant: Mutant) -> None:
     assert (planting.PACKAGE / mutant.file).read_text(encoding="utf8").count(mutant.old) == 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
-def test_killed(mutant: Mutant, tmp_path: Path) -> None:
-    status, said = outcome(mutant, tmp_path)
-    assert status == FAILED, f"{mutant.name} survived {mutant.test}\n{said[-4000:]}"
-
-
-@pytest.mark.slow
+@pytest.mark.mutants
 def test_all_pass_without_a_mutant(tmp_path: Path) -> None:
     """The named tests pass on an unharmed copy: what kills a mutant is the mutation."""
     planting.copy_package(tmp_path)
     status, said = planting.run_tests(sorted({mutant.test for mutant in MUTANTS}), tmp_path)
     assert status == pytest.ExitCode.OK, said[-4000:]
+
+
+@pytest.mark.mutants
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_killed(mutant: Mutant, tmp_path: Path) -> None:
+    status, said = outcome(mutant, tmp_path)
+    assert status == FAILED, f"{mutant.name} survived {mutant.test}\n{said[-4000:]}"
 
 
 SOUND = Mutant(
@@ -53,7 +53,7 @@ SOUND = Mutant(
 )
 
 
-@pytest.mark.slow
+@pytest.mark.mutants
 @pytest.mark.parametrize(
     ("mutant", "status"),
     [

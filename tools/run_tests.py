@@ -1,7 +1,8 @@
 """`make test`: pytest on the package and the book, nbval on the notebooks; one summary, non-zero on any failure.
 
-    python tools/run_tests.py                   everything but the browser
+    python tools/run_tests.py                   everything but the browser and the mutants
     python tools/run_tests.py --quick           neither notebooks nor slow tests
+    python tools/run_tests.py --mutants         is each planted error noticed by the test that claims to notice it
     python tools/run_tests.py NOTEBOOK ...      nbval on these notebooks only
     python tools/run_tests.py --cell-timeout 30 NOTEBOOK ...    and no cell may take longer than that [s]
 
@@ -30,6 +31,8 @@ ROOT = notebook_cache.ROOT
 # Each takes up to 1.5 GB. Three also where there are two cores: tests wait for processes that they start.
 WORKERS = max(3, min(4, os.cpu_count() or 1))
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
+HERE = "not pages and not mutants"
+"""The other tests have a target of their own: `make pages`, `make mutants`."""
 MAY_SKIP = "the live robot is not tested here"
 """What `tests/book/live/conftest.py` says of a machine without npm."""
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
@@ -89,6 +92,9 @@ def main() -> int:
     parser.add_argument("notebooks", nargs="*", metavar="NOTEBOOK")
     parser.add_argument("--quick", action="store_true", help="neither notebooks nor slow tests")
     parser.add_argument(
+        "--mutants", action="store_true", help="only: is each planted error noticed by its test"
+    )
+    parser.add_argument(
         "--cell-timeout",
         type=int,
         default=240,
@@ -98,7 +104,10 @@ def main() -> int:
     options = parser.parse_args()
     nbval = [*NBVAL, f"--nbval-cell-timeout={options.cell_timeout}"]
     if options.quick:
-        bad = run(["-m", "not slow and not pages", *PARALLEL, "tests"], {"package and book"})
+        bad = run(["-m", f"{HERE} and not slow", *PARALLEL, "tests"], {"package and book"})
+    elif options.mutants:
+        workers = ["-n", str(WORKERS), "--dist", "load"]  # one file, which every worker has a part of
+        bad = run(["-m", "mutants", *workers, "tests/test_mutants.py"], {"package and book"})
     elif options.notebooks:
         several = PARALLEL if len(options.notebooks) > 1 else []
         bad = run([*nbval, *several, *options.notebooks], {"notebooks"})
@@ -106,7 +115,7 @@ def main() -> int:
         notebooks = [str(path) for path in sorted((ROOT / "notebooks").glob("*.ipynb"))]
         notebooks.append("tools/chapter_template.ipynb")
         executed = notebook_cache.fill(notebook_cache.digest(*notebook_cache.CODE))
-        everything = ["-m", "not pages", *nbval, f"--executed={executed}", *PARALLEL, *notebooks, "tests"]
+        everything = ["-m", HERE, *nbval, f"--executed={executed}", *PARALLEL, *notebooks, "tests"]
         bad = run(everything, {"notebooks", "package and book"})
     return 1 if bad else 0
 
