@@ -39,19 +39,22 @@ def test_it_is_short() -> None:
 
 
 def test_quiet_starts(outcomes: Outcomes) -> None:
-    said = bullet("Start quietly")
-    ppo = answers.of(quiet_starts(outcomes_of_both(outcomes)), algorithm="ppo", endpoint="final")
+    final = answers.of(quiet_starts(outcomes_of_both(outcomes)), endpoint="final")
+    said = bullet(answers.start_advice(final))
+    ppo = answers.of(final, algorithm="ppo")
     above, below = answers.sides(ppo)
     assert [grade(row) for row in above] == ["found with fresh seeds", "suggested"]
-    assert not below
-    assert f"ends higher on 2 of {len(ppo)} robots (one found, with fresh seeds; one suggested)" in said
-    (cheetah,) = answers.of(ppo, robot="HalfCheetah")
-    assert f"gains {spoken(cheetah.difference, 0)} points" in said
+    assert [grade(row) for row in below] == ["suggested"]
+    assert f"higher on 2 of {len(ppo)} robots (one found, with fresh seeds; one suggested)" in said
+    assert "and lower on 1 (suggested)" in said
+    (cheetah,), (swimmer,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Swimmer"))
+    assert f"gains {spoken(cheetah.difference, 0)} points, on Swimmer {spoken(swimmer.difference, 0)}" in said
+    assert [row.robot for row in below] == ["Swimmer"]
 
 
 def test_a_law(outcomes: Outcomes) -> None:
     rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
-    assert answers.advice(rows, "ppo") == "Under PPO no law leads: take your library's."
+    assert answers.advice(rows, "ppo") == "Under PPO no law leads: keep your library's."
     said = bullet("Then no law leads.")
     graded = {
         (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)
@@ -63,12 +66,17 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert all(row.study == 2 for row in rows)
     assert graded["beta", "final", 1] == {"found with fresh seeds": 2}
     assert not graded["beta", "final", -1]
+    assert sum(graded["beta", "area", 1].values()) == 2
     assert graded["beta", "area", -1] == {"suggested": 1}
-    assert "Beta ends above a Gaussian on 2 of 6 robots (found) and below on none" in said
-    assert "by area below on 1 (suggested)" in said
+    assert (
+        "Beta ends above a Gaussian on 2 of 6 robots (found), by area above on 2 and below on 1 (suggested)"
+        in said
+    )
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found with fresh seeds": 1}
-    assert "a logit-normal ends above it on none, and below on 1 (found)" in said
+    assert graded["logit-normal", "area", 1] == {"found with fresh seeds": 1}
+    assert graded["logit-normal", "area", -1] == {"found with fresh seeds": 2}
+    assert "a logit-normal ends below on 1 (found), by area above on 1 and below on 2 (found)" in said
 
 
 def test_the_median() -> None:
@@ -77,7 +85,7 @@ def test_the_median() -> None:
     first, second = (ways_to_act.count(ways_to_act.rows_of(each), "mode") for each in (shipped, fresh))
     said = bullet("Act by the median")
     assert f"less than its median in {first.below} of {first.cells} cells, and more in {first.above} " in said
-    assert f"with fresh seeds in {second.below} and {second.above} of {second.cells})" in said
+    assert f"with fresh seeds in {second.below} and {second.above} of {second.cells}; not corrected)" in said
 
 
 def test_the_snippet_runs() -> None:

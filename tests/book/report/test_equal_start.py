@@ -62,9 +62,9 @@ def test_grades_of_the_second_study(changed: dict, word: str) -> None:
 def test_what_is_too_small_to_matter_is_not_called_no_difference() -> None:
     small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
     assert answers.counted([SECOND_ONE, small]) == (
-        "above on 1 of 2 robots (found with fresh seeds), below on 0, too small to matter on 1, "
-        "no difference found on 0"
+        "above on 1 of 2 robots (found with fresh seeds), below on 0, too small to matter on 1"
     )
+    assert answers.counted([small]).endswith("too small to matter on 1")
     assert winners.field([small]) == "too small to matter, with fresh seeds; logit-normal not run"
     weak = dataclasses.replace(SECOND_ONE, whole=False)
     assert answers.in_brackets([weak, SECOND_ONE, small]) == " (found with fresh seeds on 1, suggested on 1)"
@@ -143,8 +143,21 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     rows = [row(law, 100, 900, robot) for law in ("beta", "logit-normal") for robot in ROBOTS]
     rows = [row("logit-normal", -900, -100), *rows]
     assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
-    assert answers.advice(rows[:-1], "ppo") == "Under PPO no law leads yet: take your library's."
+    assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's."
     assert "no law leads:" in answers.advice([*rows, row("beta", -900, -100)], "ppo")
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ([(100, 900), (-100, 900)], "Start quietly."),
+        ([(100, 900), (100, 900), (-900, -100)], "Try a quiet start."),
+        ([(100, 900), (-900, -100)], "Keep the usual start."),
+        ([(-100, 900)], "Keep the usual start."),
+    ],
+)
+def test_a_quiet_start_is_advised_as_firmly_as_it_helps(ends: list[tuple[float, float]], said: str) -> None:
+    assert answers.start_advice([row("gaussian", *each) for each in ends]) == said
 
 
 def test_what_is_too_small_to_matter_leads_nowhere() -> None:

@@ -8,6 +8,7 @@ decides the word, the word is not compared, and such rows are few.
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -134,9 +135,10 @@ def law_rows() -> Iterator[tuple[str, str, str, str, Gap]]:
                         yield algorithm, law, endpoint, robot, gap(*files, endpoint)
 
 
-def counted_in(text: str) -> list[int]:
-    """The numbers of robots in a count's words, but for how well each is founded."""
-    return [int(number) for number in re.findall(r"\d+", re.sub(r" \(.*?\)", "", text))]
+def counted_in(text: str) -> Counter[str]:
+    """The numbers of robots in a count's words, each by the word before it, but for how well each is founded."""
+    found = re.findall(r"(\w+)(?: on)? (\d+)", re.sub(r" \(.*?\)", "", text))
+    return Counter({word: int(number) for word, number in found})
 
 
 @pytest.mark.parametrize("page", ["which_policy", "what_happened"])
@@ -153,12 +155,14 @@ def test_from_an_equal_start(page: str) -> None:
     for algorithm, law, endpoint in dict.fromkeys(key[:3] for key in mine):
         here = {key[3]: found for key, found in mine.items() if key[:3] == (algorithm, law, endpoint)}
         text = names["glued"][f"{law}-{algorithm}-{endpoint}"]
-        above, of, below, *small, none = counted_in(text)
-        assert above + below + sum(small) + none == of == len(here)
-        for said, side in ((above, 1), (below, -1)):
+        count = counted_in(text)
+        of, small = count.pop("of"), count["matter"]
+        assert set(count) <= {"above", "below", "matter", "found"}
+        assert sum(count.values()) == of == len(here)
+        for said, side in ((count["above"], 1), (count["below"], -1)):
             sure = sum(found.side == side and not found.near for found in here.values())
             near = sum(found.near for found in here.values())
-            assert sure - sum(small) <= said <= sure + near, (text, here)
+            assert sure - small <= said <= sure + near, (text, here)
         compared += of
     assert compared == len(mine)
 
@@ -236,11 +240,11 @@ def test_a_quiet_start() -> None:
         if row.endpoint == "final":
             counts.setdefault(row.algorithm, []).append(mine)
     for algorithm, found in counts.items():
-        above, of, below = counted_in(names["glued"][f"quiet-{algorithm}"])
+        count = counted_in(names["glued"][f"quiet-{algorithm}"])
         near = sum(each.near for each in found)
-        assert of == len(found)
-        assert abs(above - sum(each.side > 0 for each in found)) <= near
-        assert abs(below - sum(each.side < 0 for each in found)) <= near
+        assert count["of"] == len(found)
+        assert abs(count["above"] - sum(each.side > 0 for each in found)) <= near
+        assert abs(count["below"] - sum(each.side < 0 for each in found)) <= near
 
 
 CONTRASTS = (

@@ -106,6 +106,10 @@ def test_a_comparison_that_waits_for_seeds_has_no_verdict(outcomes: Outcomes) ->
     assert told.endswith("seeds still to be run on 1 (Swimmer)")
     rows = rows_of(secondary_tests.comparisons(outcomes))
     assert {row[1] for row in rows if row[4:5] == ["waits for seeds"]} == {"Swimmer"}
+    gap = secondary_tests.difference(outcomes, "σ free or of the state", "gaussian", "Hopper")
+    assert ["PPO: Gaussian free σ − Gaussian σ(s)", "Hopper", "final return", spoken(gap)] in [
+        r[:4] for r in rows
+    ]
 
 
 def test_a_finding_is_kept_where_the_wider_correction_finds_it(outcomes: Outcomes) -> None:

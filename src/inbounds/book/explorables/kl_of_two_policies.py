@@ -152,7 +152,7 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
         },
         fallback=lambda: _static_figure(policies),
         legend=(
-            Mark("wide", "ink", "old policy: wide and pale", of=tuple(f"{family}-old" for family in MAPS)),
+            Mark("wide", "ink", "old policy: thick and pale", of=tuple(f"{family}-old" for family in MAPS)),
             Mark("line", "ink", "new policy: narrow", of=tuple(f"{family}-new" for family in MAPS)),
             BOUNDS,
             Mark(
@@ -166,7 +166,7 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
 
 
 def _picture(family: str) -> Any:
-    """Return one empty picture; old curves are wide and pale, new ones narrow."""
+    """Return one empty picture; old curves are thick and pale, new ones thin."""
     shown = MAPS[family]
     fig = plot(
         f"action, {shown.does}" if shown.bounded else "latent z",

@@ -15,7 +15,7 @@ from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.rows import of as of
 from inbounds.book.report.ways_to_act import BOUNDED
-from inbounds.book.report.words import HEADS
+from inbounds.book.report.words import HEADS, robots
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
@@ -65,18 +65,34 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
 
     Example:
         >>> advice([], "trpo")
-        "Under TRPO no law leads yet: take your library's."
+        "Under TRPO too few robots have run: keep your library's."
     """
     here = of(rows, algorithm=algorithm)
     if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
-        told = " no law leads yet: take your library's"
+        told = " too few robots have run: keep your library's"
     else:
         told = {
-            "": " no law leads: take your library's",
+            "": " no law leads: keep your library's",
             "beta": ", try the Beta",
             "logit-normal": ", try the logit-normal",
         }[first_choice(here)]
     return f"Under {algorithm.upper()}{told}."
+
+
+def start_advice(rows: Sequence[Evidence]) -> str:
+    """Return the recommendation that follows from what quiet starts do: firm where they lower no return.
+
+    Args:
+        rows: of `equal_start.quiet_starts`.
+
+    Example:
+        >>> start_advice([])
+        'Keep the usual start.'
+    """
+    above, below = map(len, sides(rows))
+    if above <= below:
+        return "Keep the usual start."
+    return "Try a quiet start." if below else "Start quietly."
 
 
 def counted(rows: Sequence[Evidence]) -> str:
@@ -90,16 +106,18 @@ def counted(rows: Sequence[Evidence]) -> str:
         return "not run yet"
     above, below = sides(rows)
     small = sum(map(too_small, rows))
-    robots = f"{len(rows)} robot{'' if len(rows) == 1 else 's'}"
-    refuted = f", too small to matter on {small}" if small else ""
-    return (
-        f"above on {len(above)} of {robots}{in_brackets(above)}, below on {len(below)}{in_brackets(below)}{refuted}, "
-        f"no difference found on {len(rows) - len(above) - len(below) - small}"
-    )
+    told = [
+        f"above on {len(above)} of {robots(len(rows))}{in_brackets(above)}",
+        f"below on {len(below)}{in_brackets(below)}",
+    ]
+    left = len(rows) - len(above) - len(below) - small
+    told += [f"too small to matter on {small}"] * bool(small)
+    told += [f"no difference found on {left}"] * bool(left)
+    return ", ".join(told)
 
 
 def short(rows: Sequence[Evidence]) -> str:
-    """Return `counted` in fewer words: where a law is above and below, without grades.
+    """Return `counted` in fewer words: on how many robots a law is above and below, without grades.
 
     Example:
         >>> short([])
@@ -202,7 +220,7 @@ def _numbers(rows: Sequence[Evidence], algorithm: str) -> str:
 
     caption = (
         f"{algorithm.upper()}, minus a Gaussian that starts equally quiet: difference of means with its 95 % interval, "
-        "and how well it is founded."
+        "and how well it is founded. An interval that ends within a hundredth of its width of 0 counts as holding it."
     )
     table = [[f"{robot}, {algorithm.upper()}", *(told(robot, *each) for each in columns)] for robot in ROBOTS]
     return html.table(caption, head, table, anchors=[place_of(robot, algorithm) for robot in ROBOTS])

@@ -60,7 +60,11 @@ def _second(arm: str, variant: str, gaussian: str = "") -> Pairs:
 
 DETAILS: Mapping[str, Detail] = MappingProxyType(
     {
-        "start with executed noise 0.4": Detail("PolicyConfig(initial_std=0.4)", ("matched-noise",)),
+        "start with executed noise 0.4": Detail(
+            "PolicyConfig(initial_std=0.4)",
+            ("matched-noise",),
+            ((Column("equal", "ppo", "gaussian", FREE), Column("as-they-come", "ppo", "gaussian", FREE)),),
+        ),
         "start with executed noise 0.2 instead of 0.4": Detail(
             "PolicyConfig(initial_std=0.2)", pairs=_second("noise", "noise-0.2")
         ),

@@ -87,7 +87,9 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
     ]
     caption = (
         "Primary comparison: bounded law minus Gaussian with a free σ, PPO, executed noise 0.4 at the start. "
-        "Refuted: the interval lies within the margin. A finding waits until twenty seeds a side are there. "
+        "Refuted: the whole interval lies within the margin, with 0 in it or not. Confirmed or contradicted: p < 0.05 "
+        "after Holm over the 24, not refuted, and the difference above or below 0. Undecided: all else. A finding "
+        "waits until twenty seeds a side are there. "
         f"Of {len(rows)}: {', '.join(f'{count} {word}' for word, count in words.items())}."
     )
     return html.of_study(

@@ -15,7 +15,7 @@ from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.second import SecondaryRow, secondary
-from inbounds.study.statistics import Comparison
+from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import p_value, spoken, verdict
 
@@ -63,6 +63,23 @@ def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "fi
     """
     rows = _asked(outcomes, [(question, family)], endpoint)
     return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
+
+
+def difference(
+    outcomes: Outcomes, question: str, family: str, robot: str, endpoint: str = "final"
+) -> Estimate:
+    """Return the difference of a secondary comparison on a robot.
+
+    Args:
+        outcomes: of either study.
+        question: as for `verdicts`.
+        family: of the first side.
+        robot: whose cells are finished on both sides.
+        endpoint: final or area.
+    """
+    (found,) = (row for row in _asked(outcomes, [(question, family)], endpoint) if row.robot == robot)
+    assert found.comparison.difference is not None  # `_asked` leaves such rows out
+    return found.comparison.difference
 
 
 def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str = "final") -> tuple[int, int]:

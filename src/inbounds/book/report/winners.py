@@ -13,6 +13,7 @@ from inbounds.book.report.answers import in_brackets, of, place_of, sides, sign,
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.book.report.ways_to_act import BOUNDED
+from inbounds.book.report.words import robots
 from inbounds.study.grid import ROBOTS
 
 ALGORITHMS = ("ppo", "trpo")
@@ -98,13 +99,13 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     above, below = sides(here)
     told = (
         f"the {name} ends above on {_of(len(above), len(here))}{in_brackets(above)} "
-        f"and below on {_none(len(below))}{in_brackets(below)}{_small(here)}"
+        f"and below on {_none(len(below))}{in_brackets(below)}{_rest(here)}"
     )
     if areas := of(rows, law=law, algorithm=algorithm, endpoint="area"):
         above, below = sides(areas)
         told += (
             f". By the area under the learning curve it is above on {_none(len(above))}{in_brackets(above)} "
-            f"and below on {_none(len(below))}{in_brackets(below)}{_small(areas)}"
+            f"and below on {_none(len(below))}{in_brackets(below)}{_rest(areas)}"
         )
     if all(row.study == 2 for row in here):
         return (
@@ -114,10 +115,13 @@ def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: st
     return f"{first} When both start equally quiet, {told}."
 
 
-def _small(rows: Sequence[Evidence]) -> str:
-    """Return on how many robots a difference is too small to matter; nothing for none."""
-    count = sum(map(too_small, rows))
-    return f"; on {count} the difference is too small to matter" if count else ""
+def _rest(rows: Sequence[Evidence]) -> str:
+    """Return on how many robots a difference is too small to matter, if there is one, and on how many none is found."""
+    small = sum(map(too_small, rows))
+    left = sum(not sign(row) for row in rows) - small
+    told = [f"on {small} a difference, if there is one, is too small to matter"] * bool(small)
+    told += [f"on {left} no difference is found"] * bool(left)
+    return "".join(f"; {each}" for each in told)
 
 
 def by_test(words: Sequence[str]) -> str:
@@ -136,7 +140,7 @@ def by_test(words: Sequence[str]) -> str:
 
 def _of(count: int, total: int) -> str:
     """Return 4 of 6 robots."""
-    return f"{count} of {total} robot{'' if total == 1 else 's'}"
+    return f"{count} of {robots(total)}"
 
 
 def _none(count: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from inbounds.book.drawing.figures import LOOKS
@@ -87,27 +86,41 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
         verdicts: robot, and what `inbounds.study.words.verdict` says there.
 
     Example:
-        >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm"), ("Swimmer", "unresolved")])
-        'above on 1 of 3 robots (Ant), below on 0, not after Holm on 1, no difference found on 1'
+        >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm")])
+        'above on 1 of 2 robots (Ant), below on 0, set apart by the interval alone on 1 (Hopper)'
         >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
-        'above on 0 of 2 robots, below on 1 (Hopper), no difference found on 0, seeds still to be run on 1 (Humanoid)'
+        'above on 0 of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
         >>> by_robot([])
         'not run yet'
     """
     if not verdicts:
         return "not run yet"
-    parts = []
-    for word, name, size in (("higher", "above", f" of {len(verdicts)} robots"), ("lower", "below", "")):
-        robots = [robot for robot, verdict in verdicts if verdict == word]
-        named = f" ({', '.join(robots)})" if robots else ""
-        parts.append(f"{name} on {len(robots)}{size}{named}")
-    counts = Counter(verdict for _, verdict in verdicts)
-    if counts["not after Holm"]:
-        parts.append(f"not after Holm on {counts['not after Holm']}")
-    parts.append(f"no difference found on {counts['unresolved']}")
-    if waiting := [robot for robot, verdict in verdicts if verdict == WAITS]:
-        parts.append(f"seeds still to be run on {len(waiting)} ({', '.join(waiting)})")
+    where: dict[str, list[str]] = {}
+    for robot, verdict in verdicts:
+        where.setdefault(verdict, []).append(robot)
+
+    def told(name: str, word: str, size: str = "") -> str:
+        found = where.get(word, [])
+        return f"{name} on {len(found)}{size}" + (f" ({', '.join(found)})" if found else "")
+
+    parts = [told("above", "higher", f" of {robots(len(verdicts))}"), told("below", "lower")]
+    if "not after Holm" in where:
+        parts.append(told("set apart by the interval alone", "not after Holm"))
+    if "unresolved" in where:
+        parts.append(f"no difference found on {len(where['unresolved'])}")
+    if WAITS in where:
+        parts.append(told("seeds still to be run", WAITS))
     return ", ".join(parts)
+
+
+def robots(count: int) -> str:
+    """Return a number of robots, in words.
+
+    Example:
+        >>> robots(1), robots(6)
+        ('1 robot', '6 robots')
+    """
+    return f"{count} robot{'' if count == 1 else 's'}"
 
 
 def in_words(panels: Mapping[str, Mapping[str, Estimate | None]]) -> str:
