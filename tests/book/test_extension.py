@@ -226,6 +226,6 @@ def test_the_books_own_pages_quote_and_continue(extension: ModuleType) -> None:
         path.stem: {source.stem for source in extension.sources(path)}
         for path in (EXTENSIONS.parents[1] / "notebooks").glob("*.ipynb")
     }
-    assert found["which_policy"] == {"storing_actions", "why"}
+    assert found["which_policy"] == {"storing_actions", "greedy_action"}
     assert found["trpo"] >= {"policy_that_learns"}
     assert not found["greedy_action"]

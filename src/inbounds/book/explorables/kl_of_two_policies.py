@@ -153,7 +153,7 @@ def kl_of_two_policies(old: Pair = (0.0, 1.0), new: Pair = (0.8, 0.7)) -> Explor
         fallback=lambda: _static_figure(policies),
         legend=(
             Mark("wide", "ink", "old policy: thick and pale", of=tuple(f"{family}-old" for family in MAPS)),
-            Mark("line", "ink", "new policy: narrow", of=tuple(f"{family}-new" for family in MAPS)),
+            Mark("line", "ink", "new policy: thin", of=tuple(f"{family}-new" for family in MAPS)),
             BOUNDS,
             Mark(
                 "bars",

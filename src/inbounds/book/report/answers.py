@@ -111,8 +111,10 @@ def counted(rows: Sequence[Evidence]) -> str:
         f"below on {len(below)}{in_brackets(below)}",
     ]
     left = len(rows) - len(above) - len(below) - small
-    told += [f"too small to matter on {small}"] * bool(small)
-    told += [f"no difference found on {left}"] * bool(left)
+    if small:
+        told.append(f"too small to matter on {small}")
+    if left:
+        told.append(f"no difference found on {left}")
     return ", ".join(told)
 
 
@@ -286,5 +288,5 @@ def _waiting(panels: Mapping[str, Sequence[Evidence]]) -> list[str]:
         ]
         for title, rows in panels.items()
     }
-    told = [f"{title}: {', '.join(robots)}" for title, robots in lacking.items() if robots]
+    told = [f"{title}: {', '.join(names)}" for title, names in lacking.items() if names]
     return [html.missing(f"Not run from an equal start. {'; '.join(told)}.")] if told else []

@@ -119,9 +119,8 @@ def _rest(rows: Sequence[Evidence]) -> str:
     """Return on how many robots a difference is too small to matter, if there is one, and on how many none is found."""
     small = sum(map(too_small, rows))
     left = sum(not sign(row) for row in rows) - small
-    told = [f"on {small} a difference, if there is one, is too small to matter"] * bool(small)
-    told += [f"on {left} no difference is found"] * bool(left)
-    return "".join(f"; {each}" for each in told)
+    told = f"; on {small} a difference, if there is one, is too small to matter" if small else ""
+    return f"{told}; on {left} no difference is found" if left else told
 
 
 def by_test(words: Sequence[str]) -> str:
