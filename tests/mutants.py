@@ -1021,6 +1021,20 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/report/test_equal_start.py::test_the_first_choice_follows_from_the_numbers",
     ),
     Mutant(
+        "a start that gains as often as it loses is advised",
+        "book/report/answers.py",
+        "if above <= below:",
+        "if above < below:",
+        "tests/book/report/test_equal_start.py::test_a_quiet_start_is_advised_as_firmly_as_it_helps",
+    ),
+    Mutant(
+        "what a test does not find is counted as nothing",
+        "book/report/words.py",
+        'parts.append(told("set apart by the interval alone", "not after Holm"))',
+        "pass",
+        "tests/book/report/test_as_they_come.py",
+    ),
+    Mutant(
         "no finding is fragile",
         "book/report/as_they_come.py",
         "return self.found and not self.p_over_all < SIGNIFICANCE",
