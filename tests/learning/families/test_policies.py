@@ -1,9 +1,11 @@
+import math
+
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
+from scipy import integrate, stats
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.learning import FAMILIES, Parameters, Policy, PolicyConfig, executed_std
@@ -164,6 +166,15 @@ def test_executed_std_is_that_of_the_public_distributions() -> None:
         assert executed_std("beta", 1 + s) == pytest.approx(
             ScaledBeta(1 + s, 1 + s, -1.0, 1.0).stddev.item(), rel=1e-5
         )
+
+
+@pytest.mark.parametrize("scale", [0.3, math.e, 2.72, 12.0, 300.0])
+def test_the_executed_std_of_a_logit_normal_is_an_integral(scale: float) -> None:
+    def lost(u: float) -> float:  # of a sign's variance, where z = 2u
+        return 2 * stats.norm.pdf(2 * u, scale=scale) / np.cosh(u) ** 2
+
+    integral, _ = integrate.quad(lost, -40, 40, epsabs=1e-13, limit=500, points=[0])
+    assert executed_std("logit-normal", scale) == pytest.approx(math.sqrt(1 - integral), rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,12 @@ def nodes_and_weights(dtype: torch.dtype) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def squashed_std(scale: float) -> float:
-    """Return the standard deviation of tanh(z/2) for a centred Normal z, by quadrature."""
+    """Return the standard deviation of tanh(z/2) for a centred Normal z, by quadrature.
+
+    Beyond the default limit of σ by the public law, whose rule is finer where the squash is a step to the plain one.
+    """
+    if scale > math.e:
+        return float(LogitNormal(torch.zeros((), dtype=torch.float64), scale, -1.0, 1.0).stddev)
     nodes, weights = (x.numpy() for x in trapezoid())
     return math.sqrt(np.sum(weights * np.tanh(scale * nodes / 2) ** 2))
 
