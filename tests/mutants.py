@@ -1032,7 +1032,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "book/report/words.py",
         'parts.append(told("set apart by the interval alone", "not after Holm"))',
         "pass",
-        "tests/book/report/test_as_they_come.py",
+        "tests/book/report/test_words.py::test_each_robot_is_counted_once",
     ),
     Mutant(
         "no finding is fragile",

@@ -1,0 +1,21 @@
+"""On how many robots a difference is found: every verdict is counted once, and named where there is something to name."""
+
+import pytest
+
+from inbounds.book.report.words import WAITS, by_robot
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "said"),
+    [
+        ({"Ant": "unresolved"}, "above on 0 of 1 robot, below on 0, no difference found on 1"),
+        ({"Ant": "higher", "Hopper": "higher"}, "above on 2 of 2 robots (Ant, Hopper), below on 0"),
+        (
+            {"Ant": "lower", "Hopper": "not after Holm", "Swimmer": "unresolved", "Humanoid": WAITS},
+            "above on 0 of 4 robots, below on 1 (Ant), set apart by the interval alone on 1 (Hopper), "
+            "no difference found on 1, seeds still to be run on 1 (Humanoid)",
+        ),
+    ],
+)
+def test_each_robot_is_counted_once(verdicts: dict[str, str], said: str) -> None:
+    assert by_robot(list(verdicts.items())) == said
