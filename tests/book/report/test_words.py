@@ -1,4 +1,4 @@
-"""On how many robots a difference is found: every verdict counts once, and is named where there is something to name."""
+"""On how many robots a difference is found: each verdict counts once, and robots are named where one is found."""
 
 import pytest
 
