@@ -89,8 +89,8 @@ def start_advice(rows: Sequence[Evidence]) -> str:
         >>> start_advice([])
         'Keep the usual start.'
     """
-    above, below = map(len, sides(rows))
-    if above <= below:
+    above, below = sides(rows)
+    if not above:
         return "Keep the usual start."
     return "Try a quiet start." if below else "Start quietly."
 
