@@ -325,7 +325,13 @@ def test_why() -> None:
     glued = printed("why")["glued"]
     verdicts = 0
     told = [(name, (first,), (second,), endpoint) for name, first, second, endpoint in why_differences()]
-    told += [(f"quiet-cheetah-{a}", *quiet_and_plain("HalfCheetah", a), "final") for a in ("ppo", "trpo")]
+    told.append(("quiet-cheetah-trpo", *quiet_and_plain("HalfCheetah", "trpo"), "final"))
+    told.append(("quiet-humanoid-free", *quiet_and_plain("Humanoid", "ppo"), "final"))
+    fresh = law_cells("trpo", "logit-normal", "HalfCheetah")
+    assert fresh
+    told.append(("left-cheetah-fresh", *fresh, "final"))
+    usual = "standard-humanoid-ppo-gaussian"
+    told.append(("quiet-humanoid", ("afterwards-humanoid-ppo-gaussian-matched-noise",), (usual,), "final"))
     for name, first, second, endpoint in told:
         mine = gap(first, second, endpoint)
         numbers = [float(each.replace("−", "-")) for each in re.findall(r"[−-]?\d+(?:\.\d+)?", glued[name])]
