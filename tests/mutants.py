@@ -1021,10 +1021,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/report/test_equal_start.py::test_the_first_choice_follows_from_the_numbers",
     ),
     Mutant(
-        "a start that gains nowhere is advised",
+        "a start that gains as often as it loses is advised",
         "book/report/answers.py",
-        "if not above:",
-        "if not above and below:",
+        "if above <= below:",
+        "if above < below:",
         "tests/book/report/test_equal_start.py::test_a_quiet_start_is_advised_as_firmly_as_it_helps",
     ),
     Mutant(

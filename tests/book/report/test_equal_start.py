@@ -151,8 +151,8 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     ("ends", "said"),
     [
         ([(100, 900), (-100, 900)], "Start quietly."),
-        ([(100, 900), (-900, -100), (-900, -100)], "Try a quiet start."),
-        ([(-900, -100)], "Keep the usual start."),
+        ([(100, 900), (100, 900), (-900, -100)], "Try a quiet start."),
+        ([(100, 900), (-900, -100)], "Keep the usual start."),
         ([(-100, 900)], "Keep the usual start."),
     ],
 )

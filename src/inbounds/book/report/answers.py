@@ -80,7 +80,7 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
 
 
 def start_advice(rows: Sequence[Evidence]) -> str:
-    """Return the recommendation that follows from what quiet starts do: firm where they lower no return.
+    """Return the recommendation that follows from what quiet starts do: firm where they raise one and lower none.
 
     Args:
         rows: of `equal_start.quiet_starts`.
@@ -89,8 +89,8 @@ def start_advice(rows: Sequence[Evidence]) -> str:
         >>> start_advice([])
         'Keep the usual start.'
     """
-    above, below = sides(rows)
-    if not above:
+    above, below = map(len, sides(rows))
+    if above <= below:
         return "Keep the usual start."
     return "Try a quiet start." if below else "Start quietly."
 

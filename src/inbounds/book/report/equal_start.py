@@ -81,7 +81,8 @@ def grade(evidence: Evidence) -> Grade:
 
     Returns:
         * *found with fresh seeds*: all planned seeds of the second study are there, and its corrected test finds it;
-        * *too small to matter, with fresh seeds*: by the second protocol's rule, the interval lies within the margin;
+        * *too small to matter, with fresh seeds*: by the second protocol's rule for its primary comparison, the
+          interval lies within the margin;
         * *found*: the same test of the first study's protocol finds it;
         * *suggested*: the interval leaves out 0, but no corrected test finds it, or seeds are still to be run;
         * *no difference found*: the interval holds 0.
