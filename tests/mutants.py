@@ -133,14 +133,14 @@ MUTANTS: tuple[Mutant, ...] = (
     ),
     Mutant(
         "the bounds are swapped",
-        "distributions/bounds.py",
-        "fraction < 0.5, self.low + self.width * fraction, self.high - self.width * complement",
-        "fraction < 0.5, self.high - self.width * fraction, self.low + self.width * complement",
+        "distributions/open_interval.py",
+        "fraction < 0.5, low + width * fraction, high - width * complement",
+        "fraction < 0.5, high - width * fraction, low + width * complement",
         "tests/distributions/test_contract.py::test_latent_and_value_invert_each_other",
     ),
     Mutant(
         "a sample may sit on a bound",
-        "distributions/bounds.py",
+        "distributions/open_interval.py",
         "return torch.clamp(value, smallest, largest)",
         "return value",
         "tests/distributions/test_contract.py::test_no_latent_maps_onto_a_bound",

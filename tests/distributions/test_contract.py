@@ -409,6 +409,32 @@ def test_torch_knows_a_map_onto_the_open_interval(registry: Any) -> None:
     x = torch.tensor([[-3.0, 0.5]])
     assert torch.allclose(to_box(x), law.latent_to_value(x))
     assert torch.allclose(to_box.inv(to_box(x)), x, atol=1e-5)
+    (slope,) = torch.autograd.grad(to_box(x.requires_grad_()).sum(), x)
+    assert torch.allclose(to_box.log_abs_det_jacobian(x, to_box(x)), slope.log(), atol=1e-5)
+    far = torch.tensor([[-200.0, 200.0], [200.0, -200.0], [-torch.inf, torch.inf]])
+    assert law.support.check(to_box(far)).all()  # the closed interval's map rounds onto the bounds
+    assert to_box == registry(law.support) != registry(LogitNormal(0.0, 1.0, -1.0, 1.0).support)
+
+
+def test_next_to_a_bound_at_zero_the_score_is_a_number() -> None:
+    law = LogitNormal(0.0, 1.0, 0.0, 1.0)
+    value = law.latent_to_value(torch.tensor(-200.0)).requires_grad_()
+    (slope,) = torch.autograd.grad(law.log_prob(value), value)
+    assert value.item() > 0
+    assert not slope.isnan()
+
+
+def test_one_checked_law_is_enough_to_compare_bounds(family: Family) -> None:
+    checked = family.make()
+    unchecked = family.law(*family.parameters(), -1.0, 3.0, validate_args=False)
+    for p, q in ((checked, unchecked), (unchecked, checked)):
+        with pytest.raises(ValueError, match="equal bounds"):
+            kl_divergence(p, q)
+
+
+def test_a_value_in_double_precision_is_scored_in_it() -> None:
+    for law in (LogitNormal(0.0, 1.0, -1.0, 1.0), ScaledBeta(2.0, 3.0, -1.0, 1.0)):
+        assert law.log_prob(torch.tensor(0.3, dtype=torch.float64)).dtype == torch.float64, law
 
 
 def test_bounds_of_one_box_in_two_precisions_are_equal() -> None:

@@ -145,3 +145,10 @@ def test_impossible_rules_are_refused(rule, arguments: tuple[float, ...]) -> Non
     for number in ({"num_nodes": 1}, {"num_nodes": 0}, {"half_width": 0.0}):
         with pytest.raises(ValueError, match="trapezoid rule needs"):
             graded_trapezoid(*double(0.0, 1.0), **number)
+
+
+def test_gauss_hermite_has_as_many_nodes_as_its_weights_survive() -> None:
+    assert gauss_hermite(370).weights.sum().item() == pytest.approx(1, abs=1e-9)
+    for count, fix in ((0, "from 1 to 370, got 0$"), (371, "got 371: take the trapezoid rule")):
+        with pytest.raises(ValueError, match=fix):
+            gauss_hermite(count)

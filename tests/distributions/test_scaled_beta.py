@@ -304,3 +304,8 @@ def test_a_law_by_its_mode_is_made_and_compared_under_vmap() -> None:
 
     one_by_one = torch.stack([apart(mode, high) for mode, high in zip(modes, highs, strict=True)])
     assert torch.allclose(torch.vmap(apart)(modes, highs), one_by_one)
+
+
+def test_a_uniform_number_of_zero_is_drawn_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch, "rand", lambda shape, **options: torch.zeros(shape, dtype=options["dtype"]))
+    assert ScaledBeta(torch.full((9,), 0.5), 0.5, -1.0, 1.0).rsample_latent().isfinite().all()

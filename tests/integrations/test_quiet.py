@@ -81,8 +81,21 @@ def test_a_second_call_sets_another_noise_and_nothing_else() -> None:
 @pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
 def test_what_has_been_learned_is_not_overwritten(policy) -> None:
     model = PPO(policy, Tank(), n_steps=128, device="cpu", seed=1).learn(128)
-    with pytest.raises(ValueError, match="has learned from 128 steps: call it before `learn`"):
+    with pytest.raises(ValueError, match=r"has learned \(128 steps here\): call it before `learn`"):
         quiet_start(model)
+    heir = PPO(policy, Tank(), n_steps=128, device="cpu", seed=1)
+    heir.set_parameters(model.get_parameters())
+    with pytest.raises(ValueError, match="quiet_start is for an untrained policy"):
+        quiet_start(heir)
+
+
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+def test_a_start_is_centred_whatever_the_bias_was(policy) -> None:
+    model = PPO(policy, Tank(), n_steps=128, device="cpu", policy_kwargs={"ortho_init": False})
+    with torch.no_grad():
+        model.policy.action_net.weight.zero_()
+    action, _ = quiet_start(model).predict(np.float32([0.3, 0.5]), deterministic=True)
+    assert action == pytest.approx(MIDDLE)
 
 
 def test_a_number_as_a_bound_does_not_say_how_many_actions_there_are() -> None:

@@ -7,7 +7,7 @@ import torch
 from gymnasium import spaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sb3_contrib import TRPO
+from sb3_contrib import TRPO, RecurrentPPO
 from scipy import integrate, stats
 from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.distributions import kl_divergence
@@ -176,9 +176,9 @@ def test_its_noise_is_its_own() -> None:
         PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")
 
 
-@pytest.mark.parametrize("peer", [SAC, TD3])
+@pytest.mark.parametrize("peer", [SAC, TD3, RecurrentPPO])
 def test_who_learns_off_policy_is_told_so(peer: type) -> None:
-    with pytest.raises(TypeError, match="is for A2C, PPO and TRPO"):
+    with pytest.raises(AttributeError, match="is for A2C, PPO and TRPO"):
         peer(LogitNormalPolicy, Tank(), device="cpu")
 
 
@@ -198,3 +198,17 @@ def test_observations_may_have_names() -> None:
     model = PPO(LogitNormalPolicy, Named(), n_steps=32, batch_size=32, n_epochs=1, device="cpu").learn(32)
     obs, _ = Named().reset(seed=0)
     assert abs(model.predict(obs)[0]) < 2
+
+
+def test_numbers_of_any_kind_are_mapped_and_actions_have_the_boxs_type() -> None:
+    class Fine(Tank):
+        action_space = spaces.Box(-0.3, 0.3, (2,), np.float64)
+
+    model = PPO(LogitNormalPolicy, Fine(), **SMALL)
+    assert not hasattr(model.policy, "actor")  # what asks for it is told why; see above
+    assert model.predict(np.float32([0.3, 0.5]))[0].dtype == np.float64
+    latents = np.array([1, -1])
+    actions = model.policy.unscale_action(latents)
+    assert np.allclose(actions, 0.3 * np.tanh(latents / 2))
+    assert np.allclose(model.policy.scale_action(actions), latents)
+    assert np.array_equal(model.policy.scale_action(np.zeros(2, int)), np.zeros(2))

@@ -21,7 +21,8 @@ with warnings.catch_warnings():  # the library warns of its own deprecations whi
     from torchrl.objectives import ClipPPOLoss
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
-from inbounds.integrations.torchrl import PARAMETERS, Latents, bounded_actor
+from inbounds.integrations.torchrl import PARAMETERS, Latents, bounded_actor, quiet_actor
+from inbounds.robots import make
 from tests.integrations.tank import HIGH, HORIZON, LOW, Tank
 
 LAWS = (LogitNormal, ScaledBeta)
@@ -159,6 +160,34 @@ def test_a_mean_of_latents_is_refused() -> None:
     _, acting = bounded_actor(network(LogitNormal), LogitNormal, LOW, HIGH)
     with set_exploration_type(ExplorationType.MEAN), pytest.raises(ValueError, match="no mean of actions"):
         acting(observations(5))
+    with set_exploration_type(ExplorationType.MODE), pytest.raises(ValueError, match="no mode of actions"):
+        acting(observations(5))
+
+
+def test_a_median_is_that_of_the_actions() -> None:
+    actor, acting = bounded_actor(network(LogitNormal), LogitNormal, LOW, HIGH)
+    with torch.no_grad(), set_exploration_type(ExplorationType.MEDIAN):
+        batch = acting(observations(5))
+    assert torch.allclose(batch["action"], actor.get_dist(batch).law.median)
+    _, acting = bounded_actor(network(ScaledBeta), ScaledBeta, LOW, HIGH)
+    with set_exploration_type(ExplorationType.MEDIAN), pytest.raises(ValueError, match="no closed form"):
+        acting(observations(5))
+
+
+def test_the_packages_own_robots_are_an_environment_there() -> None:
+    """The observation that ends an episode is the old episode's; the next one starts within the noise of a reset."""
+    env = GymWrapper(make("Swimmer-v5", 3, max_episode_steps=20))
+    env.set_seed(0)
+    box = env.single_action_space
+    body = nn.Sequential(nn.Linear(8, 8, dtype=torch.float64), nn.Tanh())
+    _, acting = quiet_actor(body, 8, LogitNormal, box.low, box.high)
+    with torch.no_grad():
+        batch = env.rollout(61, acting, break_when_any_done=False)
+    assert batch["action"].abs().max() < 1
+    over = batch["next", "truncated"][..., 0]
+    assert over.nonzero()[:, 1].tolist() == 3 * [19, 39, 59]
+    assert (batch["next", "observation"][over].abs().amax(-1) > 0.2).all()
+    assert (batch["observation"][:, [0, 20, 40, 60]].abs() <= 0.1).all()
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -303,6 +303,7 @@ def test_any_robot_can_be_drawn(name):
     frames = envs.render()
     assert [frame.shape for frame in frames] == [(240, 320, 3)] * 3
     assert (frames[0] != frames[2]).any()
+    assert min(frame.mean() for frame in frames) > 60  # by their own light: without it, less
     with RobotRenderer(envs, index=2) as renderer:
         np.testing.assert_array_equal(renderer.frame(), frames[2])
         np.testing.assert_array_equal(renderer.frame(0), frames[0])
@@ -310,6 +311,8 @@ def test_any_robot_can_be_drawn(name):
     single.reset(seed=2)
     with RobotRenderer(single) as renderer:  # Gymnasium's robot in the same state gives the same picture
         np.testing.assert_array_equal(renderer.frame(), frames[2])
+    envs.close()
+    np.testing.assert_array_equal(envs.render()[2], frames[2])  # opened anew
     envs.close()
     assert make(name, 1).render() is None
 
@@ -344,6 +347,12 @@ def test_the_id_can_name_the_module_to_import():
     assert done.stderr == ""
 
 
+def test_the_room_knows_its_ids():
+    code = "import inbounds.robots, gymnasium; print(gymnasium.make_vec('inbounds/Swimmer-v5', num_envs=3))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "RobotVectorEnv(inbounds/Swimmer-v5, num_envs=3)"
+
+
 def test_registering_twice_does_no_harm():
     registration.register()
     assert set(registration.TASK_NAMES) == set(TASKS)
@@ -367,3 +376,9 @@ def test_seeds_may_be_numpys() -> None:
     expected = envs.reset(seed=3)[0]
     assert np.array_equal(envs.reset(seed=np.int64(3))[0], expected)
     assert np.array_equal(envs.reset(seed=list(np.array([3, 4])))[0], expected)
+
+
+@pytest.mark.parametrize("seed", ["12", [1.9, 2.9], [1, 2, 3], ["1", "2"]])
+def test_what_is_no_seed_is_refused(seed) -> None:
+    with pytest.raises(ValueError, match="one seed for each of the 2 robots, or one integer; got"):
+        make("Swimmer-v5", 2).reset(seed=seed)

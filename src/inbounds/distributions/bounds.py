@@ -19,11 +19,12 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
-from torch.distributions import Distribution, Transform, biject_to, constraints, transform_to
+from torch.distributions import Distribution, constraints
+
+from inbounds.distributions.open_interval import OpenInterval, from_line, open_ends, to_line
 
 __all__ = [
     "BoundedDistribution",
-    "OpenInterval",
     "SigmoidMapped",
     "TensorLike",
     "as_parameters",
@@ -32,38 +33,6 @@ __all__ = [
 ]
 
 TensorLike: TypeAlias = Tensor | float | npt.NDArray[Any] | Sequence[float]
-
-
-class OpenInterval(constraints.Constraint):
-    """Constrain to low < value < high, both ends excluded.
-
-    Args:
-        low: `[...]` lower bound.
-        high: `[...]` upper bound.
-
-    Example:
-        >>> import torch
-        >>> OpenInterval(0.0, 1.0).check(torch.tensor([0.0, 0.5, 1.0])).tolist()
-        [False, True, False]
-    """
-
-    def __init__(self, low: Tensor | float, high: Tensor | float) -> None:
-        self.lower_bound, self.upper_bound = low, high
-        super().__init__()
-
-    def check(self, value: Tensor) -> Tensor:
-        """Return, elementwise, whether value lies strictly between the bounds."""
-        return (self.lower_bound < value) & (value < self.upper_bound)
-
-    def __repr__(self) -> str:
-        return f"OpenInterval(low={self.lower_bound}, high={self.upper_bound})"
-
-
-@biject_to.register(OpenInterval)
-@transform_to.register(OpenInterval)
-def _from_the_line(constraint: OpenInterval) -> Transform:
-    """Return the map of the real line onto the interval, as for torch's own closed one."""
-    return biject_to(constraints.interval(constraint.lower_bound, constraint.upper_bound))
 
 
 class BoundedDistribution(Distribution):
@@ -184,19 +153,14 @@ class SigmoidMapped(BoundedDistribution):
         Returns:
             `[...]` values; each is measured from the bound that it is closer to.
         """
-        fraction, complement = torch.sigmoid(latent), torch.sigmoid(-latent)
-        value = torch.where(
-            fraction < 0.5, self.low + self.width * fraction, self.high - self.width * complement
-        )
-        smallest, largest = _open_ends(self.low, self.high)
-        return torch.clamp(value, smallest, largest)
+        return from_line(latent, self.low, self.high)
 
     def value_to_latent(self, value: Tensor) -> Tensor:
         """Return log(value − low) − log(high − value), `[...]`: the inverse, up to the rounding of the value.
 
         It is ±inf on the bounds and NaN beyond them.
         """
-        return torch.log(value - self.low) - torch.log(self.high - value)
+        return to_line(value, self.low, self.high)
 
     def _distances(self, value: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return value − low and high − value, positive everywhere, and which values lie outside (low, high).
@@ -306,18 +270,6 @@ def require_equal_bounds(p: BoundedDistribution, q: BoundedDistribution) -> None
         raise ValueError(f"KL needs equal bounds, but {said}. Build both from the same action space.")
 
 
-def _open_ends(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the smallest and the largest normal floating-point number strictly between low and high.
-
-    Normal, because next to a bound at zero the subnormals have infinite reciprocals.
-    """
-    low, high = low.detach(), high.detach()
-    tiny = torch.finfo(low.dtype).tiny
-    smallest = torch.maximum(torch.nextafter(low, high), low + tiny)
-    largest = torch.minimum(torch.nextafter(high, low), high - tiny)
-    return smallest, largest
-
-
 def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:
     def complain(bad: Tensor, problem: str, remedy: str) -> None:
         if bool(bad.any()):
@@ -342,7 +294,7 @@ def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:
         "the interval's length overflows",
         "Use float64, or choose bounds closer together.",
     )
-    smallest, largest = _open_ends(low, high)
+    smallest, largest = open_ends(low, high)
     complain(
         smallest > largest,
         f"no {low.dtype} number lies strictly between the bounds",

@@ -113,13 +113,16 @@ def _check_trapezoid(num_nodes: int, half_width: float) -> None:
         )
 
 
+_MOST_HERMITE_NODES = 370
+
+
 def gauss_hermite(
     num_nodes: int = 101, dtype: torch.dtype = torch.float64, device: torch.device | str = "cpu"
 ) -> Rule:
     """Return the Gauss-Hermite rule: exact where function is a polynomial of degree below 2 num_nodes.
 
     Args:
-        num_nodes: number of nodes N, at least 1.
+        num_nodes: number of nodes N, from 1 to 370: with more, NumPy's weights underflow.
         dtype: floating type of the rule.
         device: device of the rule.
 
@@ -127,15 +130,18 @@ def gauss_hermite(
         A rule with `[N]` nodes and weights.
 
     Raises:
-        ValueError: less than one node.
+        ValueError: another number of nodes.
 
     Example:
         >>> nodes, weights = gauss_hermite(3)
         >>> round(float((weights * nodes**4).sum()), 10)  # E[x⁴] = 3
         3.0
     """
-    if num_nodes < 1:
-        raise ValueError(f"the Gauss-Hermite rule needs num_nodes >= 1, got {num_nodes}")
+    if not 1 <= num_nodes <= _MOST_HERMITE_NODES:
+        raise ValueError(
+            f"the Gauss-Hermite rule needs num_nodes from 1 to {_MOST_HERMITE_NODES}, got {num_nodes}"
+            + (": take the trapezoid rule" if num_nodes > 1 else "")
+        )
     nodes, weights = np.polynomial.hermite_e.hermegauss(num_nodes)  # weight function exp(−x²/2)
     return Rule(
         torch.as_tensor(nodes, dtype=dtype, device=device),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -144,23 +144,23 @@ class LogitNormalPolicy(ActorCriticPolicy):
         self.action_dist = LogitNormalDistribution(*self._bounds)
         super()._build(lr_schedule)
 
-    @property
-    def actor(self) -> NoReturn:
-        """Refuse: what asks for it learns off policy, from actions whose gradient it takes."""
-        raise TypeError(
-            "LogitNormalPolicy is for A2C, PPO and TRPO. SAC has a squashed Gaussian of its own, and TD3 and DDPG an "
-            'actor without a law: "MlpPolicy" there'
-        )
+    def __getattr__(self, name: str) -> Any:
+        if name in ("actor", "lstm_actor"):  # the algorithm is off policy, or recurrent
+            raise AttributeError(
+                "LogitNormalPolicy is for A2C, PPO and TRPO. SAC has a squashed Gaussian of its own, TD3 and DDPG an "
+                'actor without a law ("MlpPolicy" there), and RecurrentPPO a memory that this policy has not'
+            )
+        return super().__getattr__(name)
 
     def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
-        latent = torch.as_tensor(scaled_action)
+        latent = _floating(scaled_action)
         law = self._law(torch.zeros_like(latent))
         return law.latent_to_value(latent).numpy().astype(self.action_space.dtype)
 
     def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
         """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
-        value = torch.as_tensor(action)
+        value = _floating(action)
         return self._law(torch.zeros_like(value)).value_to_latent(value).numpy()
 
     def _law(self, loc: Tensor) -> LogitNormal:
@@ -171,6 +171,11 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
         box: Any = self.action_space
         return box.low, box.high
+
+
+def _floating(array: NDArray[Any]) -> Tensor:
+    tensor = torch.as_tensor(array)
+    return tensor if tensor.is_floating_point() else tensor.to(torch.get_default_dtype())
 
 
 def quiet_start(model: Any, std: float = 0.4) -> Any:
@@ -203,9 +208,11 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         raise ValueError(
             f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
         )
-    if model.num_timesteps:
+    if (
+        model.num_timesteps or policy.optimizer.state
+    ):  # the parameters of a trained model bring their optimiser's
         raise ValueError(
-            f"quiet_start is for an untrained policy, and this one has learned from {model.num_timesteps} steps: "
+            f"quiet_start is for an untrained policy, and this one has learned ({model.num_timesteps} steps here): "
             "call it before `learn`, on a new model"
         )
     box: Any = model.action_space

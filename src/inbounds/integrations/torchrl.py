@@ -97,6 +97,28 @@ class Latents(Distribution):
         raise ValueError("a mean of latents is no mean of actions: use ExplorationType.DETERMINISTIC")
 
     @property
+    def median(self) -> Tensor:
+        """`[..., A]` the latents of a logit-normal's medians: `ExplorationType.MEDIAN`; a Beta's has no closed form.
+
+        Raises:
+            ValueError: for a Beta.
+        """
+        if not isinstance(self.law, LogitNormal):
+            raise ValueError(
+                "a Beta's median has no closed form: use ExplorationType.DETERMINISTIC, its mean"
+            )
+        return self.law.loc
+
+    @property
+    def mode(self) -> Tensor:
+        """What `ExplorationType.MODE` would ask for, in vain: the mode of latents is not that of actions.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError("a mode of latents is no mode of actions: use ExplorationType.DETERMINISTIC")
+
+    @property
     def deterministic_sample(self) -> Tensor:
         """`[..., A]` the latents of a logit-normal's median, or of a Beta's mean: TorchRL's deterministic action."""
         law = self.law

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from inbounds.headless import naming_the_backend
-from inbounds.robots.registration import NAMESPACE
+from inbounds.robots.registration import NAMESPACE, register
 
 if TYPE_CHECKING:
     from inbounds.robots.messages import MujocoWarning
@@ -36,6 +36,8 @@ __all__ = [
     "make",
     "record",
 ]
+
+register()
 
 
 def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":

@@ -1,8 +1,8 @@
 """The six tasks under Gymnasium's own roof: `gymnasium.make_vec("inbounds/HalfCheetah-v5", num_envs=10)`.
 
 The ids are `inbounds/` and Gymnasium's name of the task: the same task to the last bit, another engine under it.
-They are known once `inbounds.robots.vector_env` has been imported, as `inbounds.robots.make` does; or the
-id itself names the module to import: `"inbounds.robots.vector_env:inbounds/HalfCheetah-v5"`.
+They are known once `inbounds.robots` has been imported; or the id itself names a module to import:
+`"inbounds.robots:inbounds/HalfCheetah-v5"`.
 """
 
 from gymnasium.envs import registration

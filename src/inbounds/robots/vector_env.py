@@ -24,8 +24,6 @@ from inbounds.robots.infos import Info, masked, only
 from inbounds.robots.rendering import RobotRenderer
 from inbounds.robots.tasks import Action, Array, Flags, HalfCheetah, Hopper, Swimmer, Task, Walker2d
 
-registration.register()
-
 TASKS: dict[str, type[Task]] = {
     task.name: task for task in (Hopper, Walker2d, HalfCheetah, Ant, Humanoid, Swimmer)
 }
@@ -36,7 +34,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
 
     Robot *i* seeded with *s* behaves, bit for bit, as `gymnasium.make(name)` reset with seed *s*; an integer
     seed gives robot *i* the seed *s + i*, as in `SyncVectorEnv`. Each robot has its own random generator,
-    so it does not matter which others run beside it. Arrays that are returned are the caller's own.
+    so it does not matter which others run beside it. Arrays that are returned are the caller's own. An episode
+    that ends is followed by a new one in the same step, which Gymnasium's `NormalizeObservation` does not take.
 
     Args:
         name: of the task, a key of `TASKS` (which documents each), such as `"HalfCheetah-v5"`.
@@ -59,6 +58,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         >>> obs.shape, reward.shape, sorted(key for key in info if key[0] != "_")
         ((2, 17), (2,), ['reward_ctrl', 'reward_forward', 'x_position', 'x_velocity'])
     """
+
+    autoreset_mode = AutoresetMode.SAME_STEP  # where TorchRL looks for it
 
     def __init__(
         self,
@@ -107,7 +108,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.metadata = {
-            "autoreset_mode": AutoresetMode.SAME_STEP,
+            "autoreset_mode": self.autoreset_mode,
             "render_modes": ["rgb_array"],
             "render_fps": round(1 / self.dt),
         }
@@ -126,14 +127,9 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             Observations `[N, O]`, and whereabouts as Gymnasium reports them.
 
         Raises:
-            ValueError: the number of seeds, or the mask, does not fit.
+            ValueError: the number of seeds, a seed that is no integer, or the mask does not fit.
         """
-        seeds = [int(seed) + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
-        seeds = [None] * self.num_envs if seeds is None else [None if s is None else int(s) for s in seeds]
-        if len(seeds) != self.num_envs:
-            raise ValueError(
-                f"Pass one seed for each of the {self.num_envs} robots, or one integer; got {len(seeds)}"
-            )
+        seeds = _seeds(seed, self.num_envs)
         chosen = self._chosen(options)
         for robot in np.flatnonzero(chosen):
             if seeds[robot] is not None:
@@ -326,6 +322,16 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         of_step = {key: values for key, values in info.items() if key not in where}
         infos |= masked(where, self._everyone) | masked(only(~over, of_step), ~over)
         return infos
+
+
+def _seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """Return a seed for each robot; None goes on with the generator that is there."""
+    if isinstance(seed, Integral):
+        return [int(seed) + i for i in range(num_envs)]
+    each = [None] * num_envs if seed is None else list(seed)
+    if len(each) != num_envs or not all(s is None or isinstance(s, Integral) for s in each):
+        raise ValueError(f"Pass one seed for each of the {num_envs} robots, or one integer; got {seed!r}")
+    return [None if s is None else int(s) for s in each]
 
 
 def _check_arguments(name: str, action_mode: str, render_mode: str | None, counts: dict[str, int]) -> None:
