@@ -13,6 +13,8 @@ tries again.
 """
 
 import argparse
+import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -26,9 +28,8 @@ from notebook_cache import BUILD, CODE, ROOT, digest
 INDEX = BUILD / "html" / "index.html"
 STAMP = BUILD / "built-from"
 DRAWN_BY = BUILD / "drawn-by"
-EXTENSIONS = (
-    "book/_ext"  # what they change Sphinx doesn't know: it draws again the pages whose text has changed
-)
+DRAWN_ANEW = ("book/_ext", "_toc.yml")
+"""What every page depends on, with all titles: Sphinx draws again only the pages whose own text has changed."""
 LIVE = BUILD / "live"  # what the live robot loads, copied into the book
 PAGES = (
     "book",
@@ -47,8 +48,11 @@ PAGES = (
 def build(code: str) -> int:
     """Execute the notebooks and run Jupyter Book, both told that the output is a static page."""
     STAMP.unlink(missing_ok=True)
-    extensions = digest(EXTENSIONS)
-    same = DRAWN_BY.exists() and DRAWN_BY.read_text() == extensions
+    wanted = drawn_by()
+    same = DRAWN_BY.exists() and DRAWN_BY.read_text() == wanted
+    DRAWN_BY.unlink(
+        missing_ok=True
+    )  # an unchanged page does not warn again, nor is it drawn after an interruption
     cache = notebook_cache.fill(code)
     os.environ |= {"INBOUNDS_BOOK_BUILD": "1", "INBOUNDS_NB_CACHE": str(cache)}
     command = [
@@ -59,9 +63,18 @@ def build(code: str) -> int:
         str(ROOT),
     ]
     command += ["--warningiserror", "--nitpick", "--keep-going", "-q", *([] if same else ["--all"])]
-    if not (status := subprocess.run(command, cwd=ROOT, check=False).returncode):
-        DRAWN_BY.write_text(extensions)
-    return status
+    return subprocess.run(command, cwd=ROOT, check=False).returncode
+
+
+def drawn_by() -> str:
+    """Return a digest of what every page shows of the others: the extensions, the contents, and all titles."""
+    titles = []
+    for path in sorted([*(ROOT / "book").glob("*.md"), *(ROOT / "notebooks").glob("*.ipynb")]):
+        text = path.read_text(encoding="utf8")
+        if path.suffix == ".ipynb":
+            text = "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
+        titles.append(next((line for line in text.splitlines() if line.startswith("# ")), path.name))
+    return f"{digest(*DRAWN_ANEW)} {hashlib.sha256(chr(10).join(titles).encode()).hexdigest()[:16]}"
 
 
 def finish() -> str:
@@ -139,6 +152,7 @@ def main() -> int:
 
         student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
         stamp(everything, finish())
+        DRAWN_BY.write_text(drawn_by())
         print(f"Built in {time.perf_counter() - start:.0f} s.")
     if args.zip:
         print(f"Zipped: {zip_book()}")

@@ -35,12 +35,13 @@ CODE = (
 
 
 def digest(*names: str) -> str:
-    """Return a digest of the contents of files and folders below ROOT, without what Python and Jupyter leave behind."""
+    """Return a digest of files and folders below ROOT, without what is hidden and what Python leaves behind."""
     total = hashlib.sha256(sys.version.encode())
     for name in names:
         base = ROOT / name
         for path in sorted(base.rglob("*")) if base.is_dir() else [base]:
-            if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts):
+            inside = path.relative_to(ROOT).parts
+            if path.is_file() and "__pycache__" not in inside and not any(p.startswith(".") for p in inside):
                 total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
     return total.hexdigest()[:16]
 

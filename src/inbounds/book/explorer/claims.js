@@ -49,7 +49,7 @@
 
     // A link to a claim opens it, whatever is chosen.
     const follow = () => {
-      const line = lines.find(({ id }) => id === decodeURIComponent(location.hash.slice(1)));
+      const line = lines.find(({ id }) => `#${encodeURIComponent(id)}` === location.hash || `#${id}` === location.hash);
       if (!line) return;
       all();
       line.open = true;
