@@ -1,6 +1,7 @@
 import copy
 import dataclasses
 import json
+import math
 import os
 import pickle
 import signal
@@ -23,6 +24,7 @@ from inbounds.learning import (
     DivergedSeedWarning,
     TrainConfig,
     Trainer,
+    TRPOConfig,
     load_policies,
     preset,
     save_run,
@@ -480,6 +482,11 @@ def test_presets_are_the_table() -> None:
         (lambda: TrainConfig(epochs=0), "epochs must be positive"),
         (lambda: TrainConfig(epochs=2.5), "epochs must be a whole number, got 2.5"),
         (lambda: TrainConfig(action_mode="clipped"), "clip or raw"),
+        (lambda: TrainConfig(normalize_obs="no"), "normalize_obs must be True or False, got 'no'"),
+        (lambda: PPOConfig(normalize_advantage="False"), "normalize_advantage must be True or False"),
+        (lambda: PPOConfig(learning_rate=math.inf), "learning_rate must be finite, got inf"),
+        (lambda: TRPOConfig(max_kl=math.inf), "max_kl must be finite, got inf"),
+        (lambda: TRPOConfig(damping=math.inf), "damping must be finite, got inf"),
     ],
 )
 def test_bad_configurations_are_refused(wrong, message: str) -> None:

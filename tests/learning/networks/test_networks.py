@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inbounds.learning import ActorCritic, Mlp, NetworkConfig, Policy, PolicyConfig
+from inbounds.learning import ActorCritic, Mlp, NetworkConfig, Policy, PolicyConfig, PPOConfig
 from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.networks.perceptron import initialize_orthogonal, initialize_pytorch, tanh
 
@@ -160,12 +160,28 @@ def test_named_tensors_rebuild_the_network() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"hidden_sizes": ()}, {"hidden_sizes": (0,)}, {"initialization": "xavier"}, {"dtype": "float16"}],
+    [
+        {"hidden_sizes": ()},
+        {"hidden_sizes": (0,)},
+        {"hidden_sizes": (16.0, 16)},
+        {"hidden_sizes": 64},
+        {"initialization": "xavier"},
+        {"dtype": "float16"},
+    ],
     ids=str,
 )
 def test_network_config_is_checked(wrong: dict) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         NetworkConfig(**wrong)
+
+
+def test_a_list_of_sizes_is_the_tuple_that_a_file_gives_back() -> None:
+    assert NetworkConfig(hidden_sizes=[np.int64(64), 64]) == NetworkConfig()
+    assert hash(NetworkConfig(hidden_sizes=[64, 64])) == hash(NetworkConfig())
+
+
+def test_what_clips_nothing_may_be_infinite() -> None:
+    assert PPOConfig(clip_range=math.inf, max_grad_norm=math.inf).clip_range == math.inf
 
 
 def test_a_copied_optimiser_trains_the_copied_network() -> None:

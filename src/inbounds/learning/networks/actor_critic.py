@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -46,6 +47,12 @@ class NetworkConfig:
     """Of weights, observations and latents; physics is float64 in any case."""
 
     def __post_init__(self) -> None:
+        try:  # a list is equal to the tuple that a file gives back, and a number of units is whole
+            object.__setattr__(self, "hidden_sizes", tuple(map(operator.index, self.hidden_sizes)))
+        except TypeError:
+            raise ValueError(
+                f"hidden_sizes must be whole numbers of units, one a layer, got {self.hidden_sizes!r}"
+            ) from None
         if not self.hidden_sizes or min(self.hidden_sizes) < 1:
             raise ValueError(f"hidden_sizes needs positive numbers of units, got {self.hidden_sizes}")
         if self.initialization not in ("pytorch", "orthogonal"):

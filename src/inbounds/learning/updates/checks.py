@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
+
+import numpy as np
+
+_MAY_BE_INFINITE = ("max_grad_norm", "clip_range")  # then nothing is clipped
 
 
 def check(
@@ -16,11 +21,11 @@ def check(
     unit: Sequence[str] = (),
     positive_or_none: Sequence[str] = (),
 ) -> None:
-    """Raise a ValueError that names the first field out of range, or the first integer that is none.
+    """Raise a ValueError that names the first field out of range, or the first of another type.
 
     Args:
         config: a dataclass.
-        positive: names of fields that must be > 0.
+        positive: names of fields that must be > 0; finite, as the others, but for `max_grad_norm` and `clip_range`.
         not_negative: of fields that must be ≥ 0.
         unit: of fields that must lie in [0, 1].
         positive_or_none: of fields that must be > 0, or None.
@@ -35,6 +40,8 @@ def check(
         value = getattr(config, field.name)
         if field.type == "int" and (isinstance(value, bool) or not isinstance(value, Integral)):
             raise ValueError(f"{field.name} must be a whole number, got {value!r}")
+        if field.type == "bool" and not isinstance(value, bool | np.bool_):
+            raise ValueError(f"{field.name} must be True or False, got {value!r}")
     rules = (
         (positive, "be positive", lambda x: x > 0),
         (not_negative, "not be negative", lambda x: x >= 0),
@@ -46,6 +53,8 @@ def check(
             value = getattr(config, name)
             if not holds(value):
                 raise ValueError(f"{name} must {rule}, got {value}")
+            if name not in _MAY_BE_INFINITE and value == math.inf:
+                raise ValueError(f"{name} must be finite, got {value}")
 
 
 def check_minibatches(horizon: int, minibatch_size: int, normalized: int | None = None) -> None:
