@@ -22,6 +22,7 @@ from gymnasium.wrappers.vector import NormalizeReward
 
 from inbounds.learning import (
     DivergedSeedWarning,
+    PPOConfig,
     TrainConfig,
     Trainer,
     TRPOConfig,
