@@ -11,8 +11,8 @@ has of it (`notebook_cache.py`). NOTEBOOKs that are named are executed here and 
 
 The rest is one session, so that no worker is without work as long as another has a file to spare. A test that was
 skipped or expected to fail did not pass: nbval marks the cells after a dead kernel as expected failures, and would
-otherwise end in green. Only the live robot's tests may be left out, where npm cannot be reached: the book is built
-without it there, too.
+otherwise end in green. Only two kinds may be left out: the live robot's tests, where npm cannot be reached (the book
+is built without it there, too), and those of a GPU, where there is none.
 """
 
 import argparse
@@ -33,7 +33,11 @@ WORKERS = max(3, min(4, os.cpu_count() or 1))
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 HERE = "not pages and not mutants"
 """The other tests have a target of their own: `make pages`, `make mutants`."""
-MAY_SKIP = "the live robot is not tested here"
+# Part of a test's reason to be skipped → what the summary says of all such tests.
+MAY_SKIP = {
+    "the live robot is not tested here": "npm cannot be reached: {} tests of the live robot were left out",
+    "needs a GPU that torch can use": "torch finds no GPU: {} tests of one were left out",
+}
 """What `tests/book/live/conftest.py` says of a machine without npm."""
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
 NBVAL = ["-p", "tests.nbval_rules", "--nbval"]
@@ -52,18 +56,20 @@ def run(arguments: list[str], expected: set[str]) -> int:
         cases = list(ElementTree.parse(record).getroot().iter("testcase")) if record.exists() else []
     passed: Counter[str] = Counter()
     failed: Counter[str] = Counter()
-    without_npm = 0
+    left_out: Counter[str] = Counter()
     for case in cases:
-        if (skipped := case.find("skipped")) is not None and MAY_SKIP in skipped.get("message", ""):
-            without_npm += 1
+        skipped = case.find("skipped")
+        why = "" if skipped is None else skipped.get("message", "")
+        if allowed := [reason for reason in MAY_SKIP if reason in why]:
+            left_out[allowed[0]] += 1
             continue
         outcomes = (
             failed if any(case.find(how) is not None for how in ("failure", "error", "skipped")) else passed
         )
         outcomes[kind(case)] += 1
     print("\n── summary")
-    if without_npm:
-        print(f"npm cannot be reached: {without_npm} tests of the live robot were left out")
+    for reason, count in left_out.items():
+        print(MAY_SKIP[reason].format(count))
     for each in sorted(expected):
         print(f"{each}: {passed[each]} passed, {failed[each]} failed")
     print(f"longest: {', '.join(f'{name} {seconds:.0f} s' for name, seconds in longest(cases))}")
