@@ -29,6 +29,7 @@ from inbounds.study.ledger import (
     evidence,
     judge,
     possible_verdicts,
+    quotes,
 )
 from inbounds.study.ledger.evidence import MARGIN, costs, equals, side
 from inbounds.study.ledger.half_of_a_gap import half_left
@@ -537,14 +538,32 @@ def test_a_loss_matters_beyond_the_margin(
 # ---- how it is told
 
 
-def test_the_command_prints_the_statements(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_the_statements(shipped: Outcomes, capsys: pytest.CaptureFixture[str]) -> None:
     where = ["--results", str(ROOT / "results")]
-    for claim in claims_named(["wins-ppo-standard", "kl"]):
-        assert study([*claim.command.split()[2:], *where]) == 0
-        told = capsys.readouterr().out
-        found = judge(Outcomes.read(SHIPPED), claim)
-        assert f"{claim.id}: {found.verdict}" in told
+    assert study(["ledger", *where]) == 0
+    ids = "|".join(re.escape(claim.id) for claim in CLAIMS)
+    told_of_each = re.split(rf"^(?:{ids}): ", capsys.readouterr().out, flags=re.MULTILINE)[1:]
+    for claim, told in zip(CLAIMS, told_of_each, strict=True):
+        found = judge(shipped, claim)
+        assert told.startswith(f"{quotes.verdict(found)} ({found.counted})\n")
         assert all(str(statement) in told for statement in found.statements)
+        assert claim.id not in quotes.NOT_TESTED or quotes.judged_anew(found) in told
+
+
+def test_the_command_names_the_cells_that_are_not_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = folder_in(tmp_path)
+    (claim,) = claims_named(["wins-ppo-standard"])
+    missing, damaged, *finished = select(claim.cells)
+    write_cells(folder, [damaged, *finished])
+    with folder.cell_file(damaged).open("ab") as file:
+        file.write(b"more")
+    assert study(["ledger", claim.id, "--results", str(folder.results)]) == 0
+    told = capsys.readouterr().out
+    assert f"the others: inbounds study run {missing.id} {damaged.id}\n" in told
+    assert f"  {damaged.id}: damaged, and so not used\n" in told
+    assert f"{missing.id}: missing" not in told
 
 
 def test_an_unknown_claim_is_a_clear_line(capsys: pytest.CaptureFixture[str]) -> None:

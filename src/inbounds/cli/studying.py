@@ -15,7 +15,7 @@ from tyro.conf import Positional, arg, subcommand
 
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.grid import Cell, all_cells, select
-from inbounds.study.ledger import claims_named, judge
+from inbounds.study.ledger import claims_named, judge, quotes
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running.attempts import Settings
 from inbounds.study.running.check_ways import check_ways
@@ -262,15 +262,21 @@ def _ledger(command: Ledger, console: Console) -> int:
     for claim in chosen:
         found = judge(outcomes, claim)
         lines = [
-            f"{claim.id}: {found.verdict} ({found.counted})",
+            f"{claim.id}: {quotes.verdict(found)} ({found.counted})",
             f"  {claim.says} ({claim.where})",
             f"  {claim.test} ({claim.standing})",
         ]
+        lines += [f"  judged anew: {anew}"] if (anew := quotes.judged_anew(found)) else []
         lines += [f"    {statement}" for statement in found.statements]
-        if found.finished < found.planned:
+        states = {cell: outcomes.states[cell.id] for cell in select(claim.cells)} if claim.cells else {}
+        others = {cell.id: state for cell, state in states.items() if state != "finished"}
+        if others:
             lines.append(
-                f"  {found.cells} cells are finished; the others: inbounds study run {' '.join(claim.cells)}"
+                f"  {found.cells} cells are finished; the others: inbounds study run {' '.join(others)}"
             )
+        lines += [
+            f"  {name}: {state}, and so not used" for name, state in others.items() if state != "missing"
+        ]
         console.print("\n".join(lines), markup=False, soft_wrap=True)
     return 0
 

@@ -19,7 +19,7 @@ from inbounds.book.report import html
 from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
 from inbounds.study.ledger import Finding
-from inbounds.study.ledger.quotes import NOT_TESTED, quote, verdict
+from inbounds.study.ledger.quotes import judged_anew, quote, verdict
 
 SCRIPT = Path(__file__).with_name("claims.js")
 """What hides lines; in the built book a page loads it once."""
@@ -62,7 +62,6 @@ def claims(found: Sequence[Finding]) -> Shown:
 def _line(finding: Finding) -> dict[str, Any]:
     """Return what a claim's line shows, and what it opens to, as plain texts."""
     said = quote(finding.claim)
-    reason = NOT_TESTED.get(finding.claim.id)
     return {
         "id": f"claim-{finding.claim.id}",
         "verdict": verdict(finding),
@@ -70,7 +69,7 @@ def _line(finding: Finding) -> dict[str, Any]:
         "words": said.words if said else "",
         "place": said.place if said else "",
         "test": finding.claim.test,
-        "anew": f"{reason}. Before: {finding.verdict}." if reason else "",
+        "anew": judged_anew(finding),
         "told": finding.told.splitlines(),
         "counted": f"{finding.counted} ({finding.claim.standing})",
         "command": finding.claim.command,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
 from inbounds.study.ledger import CLAIMS, Finding, judge
-from inbounds.study.ledger.quotes import NOT_TESTED, quote, thesis_and_book, verdict
+from inbounds.study.ledger.quotes import judged_anew, quote, thesis_and_book, verdict
 from inbounds.study.ledger.verdicts import STAYS
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics.settings import LEVEL
@@ -60,8 +60,8 @@ def _words(finding: Finding) -> str:
 
 def _why_not(finding: Finding) -> str:
     """Return why a row does not test the thesis's sentence, as a line; nothing where it does."""
-    reason = NOT_TESTED.get(finding.claim.id)
-    return f"Judged anew: {reason}. Before: {finding.verdict}.\n" if reason else ""
+    anew = judged_anew(finding)
+    return f"Judged anew: {anew}\n" if anew else ""
 
 
 def counted(found: Sequence[Finding]) -> str:

@@ -160,6 +160,18 @@ def verdict(finding: Finding) -> str:
     return "not tested" if finding.claim.id in NOT_TESTED else finding.verdict
 
 
+def judged_anew(finding: Finding) -> str:
+    """Return why a row does not test the thesis's sentence, and its verdict before; nothing where it does.
+
+    Example:
+        >>> from inbounds.study.ledger import Finding, claims_named
+        >>> judged_anew(Finding(claims_named(["centres"])[0], (), 0, 0)).endswith("(rule 3). Before: undecided.")
+        True
+    """
+    reason = NOT_TESTED.get(finding.claim.id)
+    return f"{reason}. Before: {finding.verdict}." if reason else ""
+
+
 def thesis_and_book(found: Sequence[Finding]) -> tuple[list[Finding], list[Finding]]:
     """Return the rows that quote the thesis, and this book's own.
 
