@@ -243,7 +243,7 @@ def publish(folder: StudyFolder) -> Path:
 
 def motions_file(folder: StudyFolder) -> Path:
     """Return the path of the file."""
-    return folder.results / "motions.safetensors"
+    return folder.results / store.MOTIONS
 
 
 def read(folder: StudyFolder) -> dict[str, Floats]:

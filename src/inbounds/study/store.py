@@ -33,6 +33,7 @@ from inbounds.study.cell import Cell, digest_of
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
 OF_MANY_CELLS = ("nothing", "records")
+MOTIONS = "motions.safetensors"
 """Files of `evaluations` that are of no one cell."""
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
@@ -317,8 +318,12 @@ def make(path: str | Path) -> str:
     Example:
         >>> make("results/cells/standard-ant-ppo-beta.parquet")
         'run the cell (inbounds study run standard-ant-ppo-beta)'
+        >>> make("results/motions.safetensors")
+        'play the robots (python -m inbounds.book.motions)'
     """
     path = Path(path)
+    if path.name == MOTIONS:
+        return "play the robots (python -m inbounds.book.motions)"
     if path.parent.name != "evaluations":
         return f"run the cell (inbounds study run {path.stem})"
     one = "" if path.stem in OF_MANY_CELLS else f" {path.stem}"

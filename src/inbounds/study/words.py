@@ -28,8 +28,14 @@ def spoken(estimate: Estimate | None, digits: int | None = None) -> str:
 
 
 def number(value: float | np.ndarray) -> str:
-    """Say a return, with a decimal where it is small."""
-    return _minus(f"{float(value):z.0f}" if abs(float(value)) >= 100 else f"{float(value):z.1f}")
+    """Say a return, with a decimal where it is small.
+
+    Example:
+        >>> number(99.94), number(99.96)
+        ('99.9', '100')
+    """
+    exact = float(value)
+    return _minus(f"{exact:z.0f}" if abs(round(exact, 1)) >= 100 else f"{exact:z.1f}")
 
 
 def percent(share: float, digits: int = 0) -> str:

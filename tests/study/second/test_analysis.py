@@ -21,6 +21,8 @@ from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 from tests.study.test_grid import differences
 
+HISTORY = StudyFolder.shipped().results / "HISTORY.md"
+
 
 def test_the_yardsticks_are_those_of_the_protocol() -> None:
     table = TEXT.partition("| Robot | doing nothing |")[2].partition("\n\n")[0]
@@ -114,10 +116,60 @@ def test_a_verdict_waits_for_all_twenty_seeds(tmp_path) -> None:
     column = Column("equal", "ppo", "beta")
     assert pooled_scores(outcomes, column, "Hopper", "final").shape == (20,)
     assert is_whole(outcomes, column, "Hopper")
+    only_ten = Outcomes.read(folder, ten)  # the plan has twenty, whatever was read
+    assert not is_whole(only_ten, column, "Hopper")
+    assert not any(row.finding for row in second.primary(only_ten))
     assert not is_whole(outcomes, column, "Ant")
     assert is_whole(
         outcomes, Column("equal", "ppo", "logit-normal", "free-std"), "Hopper"
     )  # ten were planned
+
+
+def test_history_names_the_rows_that_hang_on_the_reading_of_a_line() -> None:
+    """An interval that contains 0 and lies within the margin: refuted, as defined; undecided, were the line a rule."""
+    told = re.split("^## ", HISTORY.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    (entry,) = [part for part in told if part.startswith("2026-11-28: two lines of PROTOCOL-2.md")]
+    words = {
+        "logit-normal": "the logit-normal's",
+        "beta": "the Beta's",
+        "final": "final return",
+        "area": "area",
+    }
+    rows = second.primary(Outcomes.read(StudyFolder.shipped(), second_cells()))
+    assert {row.finding for row in rows} == {
+        "confirmed",
+        "contradicted",
+        "refuted",
+        "undecided",
+    }  # all are there
+    named = [
+        f"- {words[row.law]} {words[row.endpoint]} on {row.robot}"
+        for row in rows
+        if row.finding == "refuted" and row.difference.low <= 0 <= row.difference.high
+    ]
+    assert [line.rstrip(";.") for line in entry.splitlines() if line.startswith("- ")] == named
+
+
+def test_history_has_the_spread_that_asked_for_twenty_seeds() -> None:
+    spread: dict[str, list[float]] = {robot: [] for robot in ROBOTS}
+    first = Outcomes.read(StudyFolder.shipped(), study_cells())
+    for outcome in first.finished.values():
+        cell = outcome.cell
+        if cell.algorithm == "ppo" and (cell.arm, cell.variant) in (
+            ("standard", ""),
+            ("mechanisms", "matched-noise"),
+        ):
+            adds = second.BEST["final"][cell.robot] - UNTRAINED[cell.robot]
+            spread[cell.robot].append(float(scores(outcome, "final").std(ddof=1)) / adds)
+    single = [share for each in spread.values() for share in each]
+    of_robots = {robot: np.sqrt(np.mean(np.square(each))) for robot, each in spread.items()}
+    lowest, highest = min(of_robots, key=of_robots.get), max(of_robots, key=of_robots.get)
+    text = " ".join(HISTORY.read_text(encoding="utf-8").split())
+    assert (
+        f"from the {len(single)} cells it names, the root mean square of a robot's cells is "
+        f"{of_robots[lowest]:.2f} ({lowest}) to {of_robots[highest]:.2f} ({highest})"
+    ) in text
+    assert f"Single cells go from {min(single):.2f} (the Gaussian on Humanoid) to {max(single):.2f}" in text
 
 
 def test_a_secondary_test_waits_for_its_seeds_too(tmp_path) -> None:

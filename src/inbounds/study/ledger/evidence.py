@@ -62,9 +62,7 @@ def beats(
 
     def find(outcomes: Outcomes) -> list[Statement]:
         rows = _compared(outcomes, contrast, endpoint)
-        best = statistics.holm(
-            [0.0 if np.isnan(rows[robot].p_value) else rows[robot].p_value for robot in ROBOTS]
-        )
+        best = statistics.holm_at_best([rows[robot].p_value for robot in ROBOTS])
         return [
             _of_comparison(_about(contrast, robot), rows[robot], -1 if robot in below else 1, float(p))
             for robot, p in zip(ROBOTS, best, strict=True)
@@ -82,7 +80,11 @@ def _compared(outcomes: Outcomes, contrast: Contrast, endpoint: str) -> dict[str
     if endpoint != START:
         return analysis.differences(outcomes, contrast, endpoint)
     first, second = (
-        {robot: seeds_of(o, START) for robot in ROBOTS if (o := outcomes.find(column, robot)) is not None}
+        {
+            robot: groups[0]
+            for robot in ROBOTS
+            if (groups := groups_of(outcomes, [(column, robot)], START)) is not None
+        }
         for column in contrast.columns
     )
     rng = generator_for("difference", *contrast, START)

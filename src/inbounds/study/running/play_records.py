@@ -155,7 +155,7 @@ def records_of(cell: Cell, folder: StudyFolder) -> list[dict[str, Any]]:
         for name, record in RECORDS.items():
             recalled = z.float().double() if record is None else record.recalled(z)
             log_ratio = NORMAL.log_prob(law, recalled) - NORMAL.log_prob(law, z)
-            wrong = float((torch.expm1(log_ratio).abs() > OFF).double().mean())
+            wrong = float((~(torch.expm1(log_ratio).abs() <= OFF)).double().mean())  # NaN is wrong
             lost = 0 if record is None else record.lost(z)
             more = {"wrong": wrong, "lost": lost, "worst": float(log_ratio.abs().max())}
             rows.append(about | {"record": name} | more)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from inbounds.study.analysis import scores
 from inbounds.study.cell import ROBOTS
+from inbounds.study.grid import all_cells
 from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
 
 MORE_SEEDS_OF = {"equal": "equal-more"}  # arm → the arm with the same columns and other seeds
@@ -24,10 +27,15 @@ def pooled(outcomes: Outcomes, column: Column, robot: str) -> list[Outcome]:
 
 
 def is_whole(outcomes: Outcomes, column: Column, robot: str) -> bool:
-    """Return whether every cell that the plan has of a column on a robot is finished."""
+    """Return whether every cell that the plan has of a column on a robot is finished, and among the outcomes."""
     ids = (part.cell_id(robot) for part in _parts(column))
-    planned = [name for name in ids if name in outcomes.states]
-    return bool(planned) and all(outcomes.states[i] == "finished" for i in planned)
+    planned = [name for name in ids if name in _planned()]
+    return bool(planned) and all(outcomes.states.get(name) == "finished" for name in planned)
+
+
+@cache
+def _planned() -> frozenset[str]:
+    return frozenset(cell.id for cell in all_cells())
 
 
 def pooled_scores(

@@ -28,6 +28,7 @@ from inbounds.study.statistics.comparisons import (
     compare,
     difference,
     holm,
+    holm_at_best,
     permutation_test,
 )
 from inbounds.study.statistics.endpoints import (
@@ -67,6 +68,7 @@ __all__ = [
     "equivalence",
     "final_score",
     "holm",
+    "holm_at_best",
     "interquartile_mean",
     "learning_curve",
     "mean_of",
