@@ -69,6 +69,14 @@ def test_an_episode_cut_off_by_the_last_step_is_worth_its_own_final_observation(
     assert ((own - next_episodes).abs() > 1e-3).all()
 
 
+def test_an_environment_that_hides_the_final_observation_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    acting = collector("beta")
+    step = acting.envs.step
+    monkeypatch.setattr(acting.envs, "step", lambda actions: (*step(actions)[:4], {}))
+    with pytest.raises(ValueError, match=r"no info\['final_obs'\].*SAME_STEP"):
+        acting.collect(40)
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_actions_come_from_latents_and_log_probs_belong_to_them(family: str) -> None:
     acting = collector(family, low=(-1.0, -0.5), high=(1.0, 2.0))

@@ -1,5 +1,6 @@
 import copy
 import dataclasses
+import enum
 import json
 import math
 import os
@@ -257,16 +258,36 @@ def test_a_number_in_a_checkpoint_keeps_its_shape(tmp_path: Path) -> None:
     assert checkpoint.load(tmp_path / "one.pt")["of no dimension"].shape == ()
 
 
+class Sign(enum.IntEnum):
+    PLUS = 1
+
+
 @pytest.mark.parametrize(
     "kept",
-    [np.random.default_rng(0), frozenset({1}), np.array([None]), np.array(["a"]), Path("x"), deque([1])],
+    [
+        np.random.default_rng(0),
+        frozenset({1}),
+        np.array([None]),
+        np.array(["a"]),
+        Path("x"),
+        deque([1]),
+        Sign.PLUS,
+    ],
 )
 def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, kept: Any) -> None:
     path = tmp_path / checkpoint.FILE_NAME
     checkpoint.save(path, some_state(1))
     with pytest.raises(TypeError, match=r"cannot keep state\['envs'\]\[1\], of type .*bit_generator.state"):
         checkpoint.save(path, some_state(2) | {"envs": [0, kept]})
+    with pytest.raises(TypeError, match=r"cannot keep a key of state\['envs'\], of type Sign"):
+        checkpoint.save(path, some_state(2) | {"envs": {Sign.PLUS: 0}})
     assert checkpoint.load(path)["records"] == [1]
+
+
+def test_numpys_numbers_are_read_again_as_pythons(tmp_path: Path) -> None:
+    path = tmp_path / checkpoint.FILE_NAME
+    checkpoint.save(path, some_state(1) | {"envs": {np.int64(3): {np.float32(0.5)}, (np.int64(1), "a"): 2}})
+    assert repr(checkpoint.load(path)["envs"]) == "{3: {0.5}, (1, 'a'): 2}"
 
 
 def test_numbers_of_another_byte_order_are_kept(tmp_path: Path) -> None:
@@ -341,6 +362,11 @@ def test_a_checkpoint_of_another_environment_is_refused(
             make_envs=lambda n: PointEnv(n, low, (1.0,) * len(low)),
         )
     assert (tmp_path / checkpoint.FILE_NAME).read_bytes() == before
+    trainer = Trainer(config, lambda n: PointEnv(n, low, (1.0,) * len(low)))
+    theta = trainer.networks.actor.theta.clone()
+    with pytest.raises(ValueError, match=said):
+        trainer.load_state_dict(checkpoint.load(tmp_path / checkpoint.FILE_NAME))
+    assert torch.equal(trainer.networks.actor.theta, theta)  # nothing of it has been loaded
 
 
 def test_a_checkpoint_that_may_not_be_read_is_not_called_damaged(

@@ -211,6 +211,11 @@ class Collector:
         The value networks of all seeds are evaluated, so that a seed's arithmetic does not depend on when the
         others' episodes end.
         """
+        if "final_obs" not in info:
+            raise ValueError(
+                "an episode was cut off, and the environment's step gave no info['final_obs']: return there the last "
+                "observation, as gymnasium's vector environments do with AutoresetMode.SAME_STEP"
+            )
         final_obs = np.zeros((len(self.streams), self.obs_dim))
         for s in np.flatnonzero(truncated):
             final_obs[s] = np.ravel(info["final_obs"][s])
@@ -266,8 +271,8 @@ class Collector:
             "noise": generator_states([stream.noise for stream in self.streams]),
         }
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to a state. Environments without `set_state` start new episodes instead, not those of the beginning.
+    def check_state_dict(self, state: dict[str, Any]) -> None:
+        """Refuse a state that is not of these environments.
 
         Raises:
             ValueError: the environment's actions have other bounds than they had.
@@ -277,6 +282,14 @@ class Collector:
                 "the environment's action bounds are not those that the run began with: "
                 "use that environment, or another run directory"
             )
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go back to a state. Environments without `set_state` start new episodes instead, not those of the beginning.
+
+        Raises:
+            ValueError: it is not of these environments.
+        """
+        self.check_state_dict(state)
         restore_generators([stream.noise for stream in self.streams], state["noise"])
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])

@@ -206,7 +206,7 @@ class Trainer:
 
         Raises:
             ValueError: another configuration wrote it (more epochs than planned then are allowed), or the environment
-                has other observations or actions than it had.
+                has other observations or actions than it had. Nothing has been loaded then.
         """
         if different := changed_fields(self.config, state["config"], FREE_TO_CHANGE):
             changes = "; ".join(f"{name}: {stored} → {ours}" for name, (stored, ours) in different.items())
@@ -214,6 +214,8 @@ class Trainer:
                 f"the checkpoint belongs to another configuration ({changes}): "
                 "use that one, or another run directory"
             )
+        self.networks.check_state_dict(state["networks"])
+        self.collector.check_state_dict(state["collector"])
         self.networks.load_state_dict(state["networks"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.collector.load_state_dict(state["collector"])

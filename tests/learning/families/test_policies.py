@@ -55,6 +55,16 @@ def test_the_maps_are_those_of_the_public_distributions() -> None:
         assert torch.allclose(unit, law.latent_to_value(latent), atol=1e-12)
 
 
+@pytest.mark.parametrize("family", NAMES)
+def test_a_box_far_from_zero_keeps_its_digits(family: str) -> None:
+    """Single precision has sixteen steps in a box of width one at a million; a double's box is used in doubles."""
+    low = np.array([1e6])
+    latent = np.linspace(0.1, 0.9, 50, dtype=np.float32)[:, None]
+    far, near = (Policy(PolicyConfig(family), at, at + 1) for at in (low, np.zeros(1)))
+    assert np.allclose(far.execute(latent) - low, near.execute(latent), rtol=0, atol=1e-6)
+    assert Policy(PolicyConfig(family), np.float32([0]), np.float32([1])).action(latent).dtype == np.float32
+
+
 def test_only_the_gaussian_leaves_the_box() -> None:
     far = np.array([[3.0, -3.0]])
     assert (policy("gaussian").action(far) > HIGH).any()

@@ -134,7 +134,10 @@ class Policy:
     def action(self, latent: NDArray[Any]) -> NDArray[Any]:
         """Return the action `[..., A]`, in the robot's units, that latents `[..., A]` stand for, not yet clipped."""
         unit = self.unit_action(latent)
-        centre, half_range = self.centre.astype(unit.dtype), self.half_range.astype(unit.dtype)
+        precision = np.result_type(
+            unit, self.dtype
+        )  # far from zero a box may need more digits than latents have
+        centre, half_range = self.centre.astype(precision), self.half_range.astype(precision)
         return centre + half_range * unit
 
     def execute(self, latent: NDArray[Any], mode: ActionMode = "clip") -> NDArray[Any]:

@@ -160,8 +160,8 @@ class ActorCritic:
         """Return the weights."""
         return {"actor": self.actor.theta.clone(), "critic": self.critic.theta.clone()}
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to weights from `state_dict`.
+    def check_state_dict(self, state: dict[str, Any]) -> None:
+        """Refuse weights of other networks.
 
         Raises:
             ValueError: they are of other observations or actions.
@@ -171,5 +171,13 @@ class ActorCritic:
                 "the environment's observations or actions have another size than when the run began: "
                 "use that environment, or another run directory"
             )
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go back to weights from `state_dict`.
+
+        Raises:
+            ValueError: they are of other observations or actions.
+        """
+        self.check_state_dict(state)
         self.actor.theta.copy_(state["actor"])
         self.critic.theta.copy_(state["critic"])

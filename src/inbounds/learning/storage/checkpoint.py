@@ -13,7 +13,8 @@ import torch
 from inbounds.learning.storage.whole_files import damaged, says_nothing_of_the_file, write_whole
 
 FILE_NAME = "checkpoint.pt"
-_KEPT = (bool, int, float, complex, str, bytes, set, torch.Tensor, type(None))
+_PLAIN = (bool, int, float, complex, str, bytes, type(None))
+"""Kept as they are, but no subclass of them: to read an enumeration's member is to execute what made it."""
 
 
 def save(path: Path, state: dict[str, Any]) -> None:
@@ -21,7 +22,7 @@ def save(path: Path, state: dict[str, Any]) -> None:
 
     Args:
         path: of the file; its folder must exist.
-        state: nested dictionaries, lists, tuples, numbers, strings, tensors and NumPy arrays.
+        state: nested dictionaries, lists, tuples, sets, numbers, strings, tensors and NumPy arrays.
 
     Raises:
         TypeError: it holds something else, which could not be read again; the old file is untouched.
@@ -75,10 +76,15 @@ def _to_tensors(tree: Any, place: str = "state") -> Any:
     if isinstance(tree, np.generic):
         tree = tree.item()
     if isinstance(tree, dict):
-        return {key: _to_tensors(value, f"{place}[{key!r}]") for key, value in tree.items()}
+        return {
+            _to_tensors(key, f"a key of {place}"): _to_tensors(value, f"{place}[{key!r}]")
+            for key, value in tree.items()
+        }
+    if type(tree) is set:
+        return {_to_tensors(value, f"an element of {place}") for value in tree}
     if type(tree) in (list, tuple):
         return type(tree)(_to_tensors(value, f"{place}[{i}]") for i, value in enumerate(tree))
-    if isinstance(tree, _KEPT):
+    if type(tree) in _PLAIN or isinstance(tree, torch.Tensor):
         return tree
     raise TypeError(
         f"a checkpoint cannot keep {place}, of type {type(tree).__name__}: let get_state of "
