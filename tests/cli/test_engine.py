@@ -25,7 +25,7 @@ def test_the_compiled_engine_without_numba_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("inbounds.learning.updates.engine.NEEDS", ("a_compiler_that_nobody_has",))
-    code, out, err = run(*small(tmp_path / "run", 1, "Swimmer-v5", "--engine", "compiled"))
+    code, out, err = run(*small(tmp_path / "run", 1, "Swimmer-v5", "--engine", "compiled", "--tensorboard"))
     assert (code, out) == (2, "")
     assert "needs a_compiler_that_nobody_has, of the extra `fast`: pip install '.[fast]'" in err
     assert not (tmp_path / "run").exists()

@@ -12,9 +12,11 @@ import pytest
 import torch
 from rich.console import Console
 
-from inbounds.cli import main
+from inbounds.cli import main, options
 from inbounds.cli.progress import TrainingProgress
+from inbounds.cli.training import STEP_SIZE
 from inbounds.learning import Trainer
+from inbounds.learning.config import ALGORITHMS
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import load_checkpoint, load_policies, read_curves
 from inbounds.learning.storage.whole_files import LOCK_FILE, is_disk_full
@@ -92,8 +94,6 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     console = Console(force_terminal=True, width=150, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
     command = small(Path("unused"))
-    from inbounds.cli import options
-
     trainer = Trainer(options.parse(command).train_config())  # type: ignore[union-attr]
     with TrainingProgress(3, console) as progress:
         for _ in range(3):
@@ -121,6 +121,16 @@ def test_the_return_of_a_seed_is_the_last_one_known() -> None:
     text = console.export_text()
     assert "return 2.0 ± 1.4  KL 0.25  saturation 25.0 %" in text
     assert "1 of 3 seeds diverged" in text
+
+
+@pytest.mark.parametrize("algo", ALGORITHMS)
+def test_the_remedy_of_divergence_is_an_option_of_the_algorithm(algo: str, tmp_path: Path) -> None:
+    chosen = [] if algo == "ppo" else ["--algo", algo]
+    for option in STEP_SIZE[algo]:
+        options.parse(["train", "Hopper-v5", *chosen, option, "0.001"])
+    code, _, err = run(*small(tmp_path / "run", 2, "Hopper-v5", *chosen), "--algorithm.learning-rate", "1e30")
+    assert code == 1
+    assert f"train with a smaller {' or '.join(STEP_SIZE[algo])} in another --out" in err
 
 
 def test_when_all_seeds_diverge(tmp_path: Path) -> None:

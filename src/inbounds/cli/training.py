@@ -86,6 +86,14 @@ def run(command: Train) -> int:
         return _Session(command, config, run_dir, room).run()
 
 
+STEP_SIZE = {
+    "ppo": ("--algorithm.learning-rate",),
+    "trpo": ("--algorithm.max-kl", "--algorithm.learning-rate"),
+    "policy-gradient": ("--algorithm.policy-learning-rate", "--algorithm.learning-rate"),
+}
+"""Algorithm → the options that decide how far an epoch moves the networks."""
+
+
 class _Session:
     """One process' part of a run: what it does after every epoch, and what it says when it ends."""
 
@@ -103,9 +111,6 @@ class _Session:
         with contextlib.ExitStack() as stack:
             progress = self.progress = stack.enter_context(TrainingProgress(config.epochs))
             watchers: list[Any] = [progress]
-            if self.wants_tensorboard:
-                board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
-                watchers.append(stack.enter_context(board))
             if config.engine == "compiled":
                 try:
                     compiled_engine(FAMILIES[config.policy.family])  # before anything is promised
@@ -115,6 +120,9 @@ class _Session:
                     if not is_ours(error):
                         raise
                     raise CommandError(str(error), 2) from error
+            if self.wants_tensorboard:  # when nothing is left that could refuse the command
+                board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
+                watchers.append(stack.enter_context(board))
             if start:
                 progress.say(f"going on with {self.run_dir}, {start} epochs done")
             try:
@@ -165,7 +173,9 @@ class _Session:
 
     def _conclude(self, trainer: Trainer, start: int) -> int:
         if trainer.diverged.all():
-            slower = "train with a smaller --algorithm.learning-rate in another --out"
+            slower = (
+                f"train with a smaller {' or '.join(STEP_SIZE[self.config.algorithm_name])} in another --out"
+            )
             mended = (
                 "mend the environment, which has returned an observation or a reward that is no finite number"
             )
