@@ -27,6 +27,7 @@ from benchmarks.run import machine, versions
 from benchmarks.side_by_side import OURS, PEER, Job, jobs, run_jobs
 from benchmarks.validate import ROOT, curves, plot
 from inbounds.study import statistics
+from inbounds.study.running.many_cells import cores
 
 MARGINS: Mapping[str, float] = MappingProxyType({"Ant-v5": 170.0, "HalfCheetah-v5": 860.0})
 """In points of return, by robot: the protocol's."""
@@ -147,9 +148,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--envs", nargs="+", default=list(MARGINS), choices=list(MARGINS), help="both")
     parser.add_argument("--seeds", type=int, default=10, help="of each side (10)")
     parser.add_argument("--engine", choices=("compiled", "autograd"), default="compiled", help="of our side")
-    parser.add_argument(
-        "--workers", type=int, default=len(os.sched_getaffinity(0)), help="processes, one thread each"
-    )
+    parser.add_argument("--workers", type=int, default=cores(), help="processes, one thread each")
     parser.add_argument("--nice", type=int, default=19, help="added to the processes' niceness (19)")
     parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results" / "anchor")
     parser.add_argument(

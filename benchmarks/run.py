@@ -212,6 +212,10 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--repeats", type=int, default=5, help="turns of each contestant that count (5)")
     parser.add_argument("--horizon", type=int, default=Work.horizon, help="env steps of a rollout (2048)")
+    if not hasattr(os, "sched_getaffinity"):
+        parser.exit(
+            2, "benchmarks.run pins everything to one core, which takes Linux (a container will do)\n"
+        )
     parser.add_argument(
         "--core", type=int, default=max(os.sched_getaffinity(0)), help="to pin all to (the last)"
     )
@@ -219,15 +223,21 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         "--python", action="append", default=[], metavar="NAME=PATH", help="interpreter of one contestant"
     )
     parser.add_argument(
-        "--output", type=Path, default=ROOT / "benchmarks" / "results", help="folder to write to"
+        "--output",
+        type=Path,
+        default=ROOT / "benchmarks" / "results",
+        help="folder to write to (of some environments or contestants only: …/some)",
     )
     parser.add_argument(
         "--quick", action="store_true", help="Hopper, 256 steps, one repeat; writes to …/quick"
     )
     chosen = parser.parse_args(arguments)
+    some = set(chosen.envs) != set(ENVS) or set(chosen.contestants) != set(everyone)
     if chosen.quick:
         chosen.envs, chosen.repeats, chosen.horizon = chosen.envs[:1], 1, 256
         chosen.output = chosen.output / "quick"
+    elif some and chosen.output == parser.get_default("output"):  # which holds the results of all
+        chosen.output = chosen.output / "some"
     if chosen.horizon % Work.minibatch_size:
         parser.error(
             f"--horizon must be a multiple of the minibatch, {Work.minibatch_size}; got {chosen.horizon}"

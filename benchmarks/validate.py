@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -27,6 +26,7 @@ from rich.console import Console
 from benchmarks.equivalence import area, equivalence, seeds_needed
 from benchmarks.run import machine, versions
 from benchmarks.side_by_side import OURS, PEER, Job, jobs, run_jobs
+from inbounds.study.running.many_cells import cores
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = """
@@ -147,9 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--normalize", action="store_true", help="observations, by running statistics, on both sides"
     )
     parser.add_argument("--margin", type=float, default=0.15, help="relative, of equivalence (0.15)")
-    parser.add_argument(
-        "--workers", type=int, default=len(os.sched_getaffinity(0)), help="processes, one thread each"
-    )
+    parser.add_argument("--workers", type=int, default=cores(), help="processes, one thread each")
     parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results" / "validation")
     parser.add_argument(
         "--quick", action="store_true", help="2 seeds, 2 epochs of 256 steps; writes to …/quick"

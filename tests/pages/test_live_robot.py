@@ -254,11 +254,19 @@ def test_it_waits_where_motion_is_unwelcome(webgl: Browser, address: str) -> Non
     page = start(context, address + PAGE)
     page.wait_for_timeout(500)
     assert reading(page, "Time") == 0
-    assert "reduced motion" in robot(page).locator("[aria-live]").inner_text()
+    said = robot(page).locator("[aria-live]")
+    assert "reduced motion" in said.inner_text()
+    assert said.get_attribute("aria-live") == "polite"
     robot(page).get_by_role("button", name="Play").click()
     page.wait_for_function(
         "() => parseFloat(document.querySelectorAll('.inbounds-live-robot td')[2].textContent) > 0"
     )
+    page.wait_for_function(
+        "() => document.querySelector('.inbounds-live-says').textContent.includes('return')"
+    )
+    assert said.get_attribute("aria-live") == "off"  # what changes every few seconds interrupts nobody
+    robot(page).get_by_role("button", name="One step").click()
+    assert said.get_attribute("aria-live") == "polite"
     context.close()
 
 

@@ -120,6 +120,14 @@ def test_a_wrong_choice_is_explained(words: list[str], fix: str, capsys: pytest.
     assert fix in capsys.readouterr().err
 
 
+def test_results_of_some_do_not_replace_those_of_all() -> None:
+    tracked = run.parse([]).output
+    for words in (["--envs", "Hopper-v5"], ["--contestants", "floor"]):
+        assert run.parse(words).output == tracked / "some"
+        assert run.parse([*words, "--quick"]).output == tracked / "quick"
+        assert run.parse([*words, "--output", "elsewhere"]).output == Path("elsewhere")
+
+
 @pytest.mark.slow
 def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture) -> None:
     names = ["floor", "inbounds-ppo-10", "inbounds-compiled-1", "rltools-ppo", "sb3-ppo", "sbx-ppo"]

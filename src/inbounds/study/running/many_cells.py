@@ -96,7 +96,7 @@ class _LocalRun:
         self.running: list[_Running] = []
         self.reports: dict[str, CellReport] = {}
         self.deaths: dict[str, int] = {}
-        self.jobs = settings.jobs or _cores()
+        self.jobs = settings.jobs or cores()
         minutes = settings.max_minutes
         self.deadline = float("inf") if minutes is None else time.time() + 60 * minutes
         self.signal = 0
@@ -234,8 +234,13 @@ def commit_cell(cell: Cell, folder: StudyFolder) -> str:
     return ""
 
 
-def _cores() -> int:
-    """Return the cores that this process may use."""
+def cores() -> int:
+    """Return how many cores this process may use.
+
+    Example:
+        >>> cores() >= 1
+        True
+    """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -85,7 +85,7 @@ inbounds.live.Show = class {
     film.querySelectorAll("video").forEach((video) => video.pause());
     this.watch();
     this.setPlaying(this.playing);
-    if (!this.playing) this.says.textContent = "It waits, because your system asks for reduced motion: press Play.";
+    if (!this.playing) this.say("It waits, because your system asks for reduced motion: press Play.");
   }
 
   // Off screen and in a hidden tab nothing runs; colours follow the theme.
@@ -122,13 +122,13 @@ inbounds.live.Show = class {
       } finally {
         this.busy = false;
       }
-      this.says.textContent = ""; // of what was there before
+      this.say(""); // of what was there before
       this.restart(this.start);
       this.wake();
     });
     if (first) return this.changing;
     return this.changing.catch((error) => {
-      this.says.textContent = `That could not be loaded (${error.message}): choose another.`;
+      this.say(`That could not be loaded (${error.message}): choose another.`);
     });
   }
 
@@ -232,7 +232,13 @@ inbounds.live.Show = class {
   speak() {
     this.silence = 0;
     if (!this.ready) return;
-    this.says.textContent = this.panels.filter((panel) => panel.player).map((panel) => panel.sentence()).join(" ");
+    this.say(this.panels.filter((panel) => panel.player).map((panel) => panel.sentence()).join(" "), !this.playing);
+  }
+
+  // Aloud, a screen reader reads it at once; what changes by itself, every few seconds, would never let it finish.
+  say(text, aloud = true) {
+    this.says.setAttribute("aria-live", aloud ? "polite" : "off");
+    this.says.textContent = text;
   }
 
   redraw() {
