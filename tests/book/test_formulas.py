@@ -45,6 +45,7 @@ def test_a_page_has_its_formulas_and_no_script(folder: Path) -> None:
     assert "<script" not in page
     assert page.index("../_static/formulas.css?v=") < page.index("</head>")
     assert [path.name for path in (folder / "_static").rglob("*.*")] == ["formulas.css", "a.woff"]
+    assert "Apache License" in (folder / "_static" / "mathjax" / "LICENSE").read_text(encoding="utf8")
     styles = (folder / "_static" / "formulas.css").read_text(encoding="utf8")
     for glyph in ("1D44E.TEX-I", "7B", "5B", "1D53C.TEX-A"):  # a { [ E: a brace is one in the sheet, too
         assert f".mjx-c{glyph}::before {{" in styles

@@ -157,7 +157,7 @@ def set_all(
         >>> "<mi>x</mi>" in made["x^2", False]["html"]  # doctest: +SKIP
         True
     """
-    script = made_once(cache, [*(JS / name for name in _INPUTS), Path(__file__)], _make) / "set.js"
+    script = _mathjax(cache) / "set.js"
     asked = {
         "formulas": [{"tex": tex, "display": display} for tex, display in wanted],
         "macros": macros,
@@ -198,8 +198,14 @@ def only_used(styles: str, pages: Iterable[str]) -> str:
     return "".join(rule.strip() + "\n" for rule in kept)
 
 
+def _mathjax(cache: Path = CACHE / "formulas") -> Path:
+    """Return the folder with the bundled MathJax and its licence."""
+    return made_once(cache, [*(JS / name for name in _INPUTS), Path(__file__)], _make)
+
+
 def _make(folder: Path, made: Path) -> None:
     esbuild(folder, "set.entry.js", made / "set.js", "--platform=node", "--format=cjs", "--target=node20")
+    shutil.copy2(folder / "node_modules" / "mathjax-full" / "LICENSE", made)
 
 
 def _macros(page: str) -> dict[str, Any]:
@@ -210,10 +216,11 @@ def _macros(page: str) -> dict[str, Any]:
 
 
 def _keep_fonts_only(static: Path) -> None:
-    """Remove MathJax's scripts, 15 MB, that no page asks for any more."""
+    """Remove MathJax's scripts, 15 MB, that no page asks for any more; beside the fonts stays their licence."""
     fonts, kept = static / FONTS, static / "fonts-of-formulas"
     if fonts.is_dir():
         fonts.rename(kept)
         shutil.rmtree(static / "mathjax")
         fonts.parent.mkdir(parents=True)
         kept.rename(fonts)
+        shutil.copy2(_mathjax() / "LICENSE", static / "mathjax")
