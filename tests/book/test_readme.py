@@ -106,3 +106,32 @@ def test_the_picture_is_the_drawing() -> None:
     assert readme_picture.TARGET.read_text(encoding="utf8") == readme_picture.drawing()
     assert readme_picture.TARGET.stat().st_size < 10_000
     assert "three_laws.svg" in TEXT
+
+
+def test_the_speeds_of_the_benchmarks_page_are_those_measured() -> None:
+    table = (ROOT / "benchmarks" / "results" / "speed.md").read_text(encoding="utf8")
+    page = " ".join((ROOT / "benchmarks" / "README.md").read_text(encoding="utf8").split())
+
+    def over_peer(robot: str, who: str) -> float:
+        section = table.partition(f"\n## {robot}-v5\n")[2].partition("\n## ")[0]
+        (row,) = [line for line in section.splitlines() if line.startswith(f"| {who} |")]
+        return float(row.split("|")[3].split()[0])
+
+    cheetah, hopper, ant, humanoid, trpo = (
+        [over_peer(robot, f"In Bounds {algorithm}, S = {seeds}") for seeds in (10, 1)]
+        for robot, algorithm in (
+            ("HalfCheetah", "PPO"),
+            ("Hopper", "PPO"),
+            ("Ant", "PPO"),
+            ("Humanoid", "PPO"),
+            ("Hopper", "TRPO"),
+        )
+    )
+    assert (
+        f": {cheetah[0]:.1f} on HalfCheetah, {hopper[0]:.1f} on Hopper, {ant[0]:.1f} on Ant, {humanoid[0]:.1f} on "
+        f"Humanoid (PPO), and {trpo[0]:.1f} on Hopper under TRPO."
+    ) in page
+    assert (
+        f": {cheetah[1]:.2f}, {hopper[1]:.2f}, {ant[1]:.2f} and {humanoid[1]:.2f} (PPO), and {trpo[1]:.2f} on Hopper "
+        "under TRPO."
+    ) in page
