@@ -349,7 +349,7 @@ def test_a_full_disk_starts_no_other_cell(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("commit", [False, True])
-def test_only_what_has_just_been_finished_is_committed(
+def test_what_is_finished_is_committed(
     commit: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     committed: list[Cell] = []
@@ -360,7 +360,7 @@ def test_only_what_has_just_been_finished_is_committed(
     pool, said = a_pool([], folder_in(tmp_path), commit=commit)
     for cell, outcome in ((finished, "finished"), (known, "was finished"), (stopped, "stopped")):
         pool._report(cell, CellReport(outcome))
-    assert committed == ([finished] if commit else [])
+    assert committed == ([finished, known] if commit else [])
     assert ("git said no" in said.getvalue()) == commit
 
 
@@ -414,7 +414,15 @@ def test_commit_takes_the_cell_and_nothing_else(tmp_path: Path) -> None:
         "results/checksums.txt",
         "",
     ]
+    before = git("rev-parse", "HEAD")
+    assert commit_cell(cell, folder) == ""  # git has it
+    assert git("rev-parse", "HEAD") == before
+    run_cell(other, folder)
+    (tmp_path / ".git" / "index.lock").touch()
     assert "did not commit it" in commit_cell(other, folder)
+    (tmp_path / ".git" / "index.lock").unlink()
+    assert commit_cell(other, folder) == ""  # the next time
+    assert git("show", "--name-only", "--format=%s").startswith(f"Add study cell {other.id}\n")
 
 
 def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -428,6 +436,8 @@ def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFi
     for wrong in ("--jobs 0", "--nice 20"):
         assert study(["run", "standard", *wrong.split()]) == 2
         assert f"{wrong.split()[0][2:]} must be" in capsys.readouterr().err
+    assert study(["run", "standard", "--commit", "--scheduler", "tcp://127.0.0.1:1"]) == 2
+    assert "leave commit or scheduler out" in capsys.readouterr().err
     for command in ("verify", "ledger"):
         assert study([command, "--results", str(tmp_path / "elsewhere")]) == 2
         assert "go to the source tree, or name it with --results" in capsys.readouterr().err

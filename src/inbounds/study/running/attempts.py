@@ -39,7 +39,7 @@ class Settings:
     max_minutes: float | None = None
     """When time is up, running cells save a checkpoint and stop; no cell is started."""
     commit: bool = False
-    """Commit the results of each finished cell with git."""
+    """Commit the results of each finished cell with git, of those too that were finished and are not committed."""
     scheduler: str | None = None
     """Address of a Dask scheduler, tcp://host:port, whose workers share the folders; None runs here."""
 
@@ -48,6 +48,8 @@ class Settings:
             raise ValueError(f"jobs must be at least 1, got {self.jobs}")
         if not 0 <= self.nice <= 19:
             raise ValueError(f"nice must be between 0 and 19, got {self.nice}")
+        if self.commit and self.scheduler is not None:
+            raise ValueError("a cluster's cells are not committed: leave commit or scheduler out")
         if self.max_minutes is not None and not self.max_minutes >= 0:  # NaN is no number of minutes
             raise ValueError(f"max_minutes must be 0 or more, got {self.max_minutes}")
 

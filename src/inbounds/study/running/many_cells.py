@@ -173,7 +173,8 @@ class _LocalRun:
         self.progress.done(cell, report.outcome, report.message)
         if report.outcome == "disk full":  # for the next cell too
             self.waiting.clear()
-        wanted = report.outcome == "finished" and self.settings.commit
+        # One that was finished may have lost its commit: the process was killed before it, or git refused.
+        wanted = report.outcome in ("finished", "was finished") and self.settings.commit
         if wanted and (complaint := commit_cell(cell, self.folder)):
             self.progress.say(complaint)
 
@@ -218,7 +219,7 @@ def _each_once(messages: Sequence[str]) -> list[str]:
 
 
 def commit_cell(cell: Cell, folder: StudyFolder) -> str:
-    """Commit the files of a finished cell, and nothing else.
+    """Commit the files of a finished cell, and nothing else; nothing where git has them.
 
     Returns:
         What went wrong; empty if nothing did.
@@ -226,6 +227,9 @@ def commit_cell(cell: Cell, folder: StudyFolder) -> str:
     paths = [str(path.resolve()) for path in (*folder.files(cell), folder.results / "checksums.txt")]
     git = ["git", "-C", str(folder.results)]
     try:
+        status = [*git, "status", "--porcelain", "--", *paths[:-1]]
+        if not subprocess.run(status, capture_output=True, text=True, check=True).stdout:
+            return ""
         for command in (["add", "--", *paths], ["commit", "-m", f"Add study cell {cell.id}", "--", *paths]):
             subprocess.run([*git, *command], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError) as error:
