@@ -49,8 +49,17 @@ def percent(share: float, digits: int = 0) -> str:
 
 
 def p_value(p: float) -> str:
-    """Say a p-value."""
-    return "" if np.isnan(p) else "< 0.001" if p < 0.001 else f"{p:.3f}"
+    """Say a p-value, so that one below the level of significance can be told from one above.
+
+    Example:
+        >>> p_value(0.0497), p_value(0.0502), p_value(0.0002)
+        ('< 0.050', '0.050', '< 0.001')
+    """
+    if np.isnan(p):
+        return ""
+    if p < 0.001:
+        return "< 0.001"
+    return f"< {SIGNIFICANCE:.3f}" if p < SIGNIFICANCE <= round(p, 3) else f"{p:.3f}"
 
 
 def p_equals(p: float) -> str:
