@@ -1,3 +1,6 @@
+import dataclasses
+from collections.abc import Callable
+
 import pytest
 import torch
 
@@ -25,6 +28,23 @@ def explicit_hessian(nets, rollout, seed: int) -> torch.Tensor:
     return torch.stack(rows)
 
 
+def explicit_fisher(nets, rollout, seed: int) -> torch.Tensor:
+    """The mean of score · scoreᵀ of one seed's drawn latents, a score at a time."""
+    log_prob = nets.policy.law.log_prob(nets.parameters(rollout.obs), rollout.latent)[seed]
+    weights = nets.actor.parameters
+    scores = torch.stack(
+        [flatten(torch.autograd.grad(x, weights, retain_graph=True))[seed] for x in log_prob]
+    )
+    return scores.T @ scores / len(scores)
+
+
+def explicit_gradient(nets, rollout, advantage: torch.Tensor) -> torch.Tensor:
+    """The surrogate's where ratios are 1 and entropy has no weight, `[S, P]`: the policy gradient."""
+    log_prob = nets.policy.law.log_prob(nets.parameters(rollout.obs), rollout.latent)
+    objective = (log_prob * advantage).mean(1).sum()
+    return flatten(torch.autograd.grad(objective, nets.actor.parameters))
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_product_is_with_the_hessian(family: str) -> None:
     _, nets, rollout = started(family)
@@ -42,16 +62,8 @@ def test_the_sampled_fisher_is_the_mean_of_score_times_score(family: str) -> Non
     _, nets, rollout = started(family)
     product = trpo.sampled_fisher_product(nets, rollout.obs, rollout.latent)
     v = torch.randn(nets.actor.theta.shape, dtype=torch.float64)
-    log_prob = nets.policy.law.log_prob(nets.parameters(rollout.obs), rollout.latent)
     for s in range(2):
-        scores = torch.stack(
-            [
-                flatten(torch.autograd.grad(x, nets.actor.parameters, retain_graph=True))[s]
-                for x in log_prob[s]
-            ]
-        )
-        fisher = scores.T @ scores / len(scores)
-        assert torch.allclose(product(v)[s], fisher @ v[s], rtol=1e-8, atol=1e-11)
+        assert torch.allclose(product(v)[s], explicit_fisher(nets, rollout, s) @ v[s], rtol=1e-8, atol=1e-11)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -135,6 +147,65 @@ def test_the_full_step_has_the_length_of_the_trust_region() -> None:
     step = trpo.natural_step(nets, rollout, advantage, config)
     product = trpo.damped(trpo.kl_hessian_product(nets, rollout.obs), config.damping)
     assert torch.allclose(trpo.dot(step, product(step)) / 2, torch.full((2, 1), config.max_kl).double())
+
+
+@pytest.mark.parametrize(
+    ("fisher", "explicit"), [("hessian", explicit_hessian), ("sampled", explicit_fisher)]
+)
+@pytest.mark.parametrize("damping", [0.5, 3.0])
+@pytest.mark.parametrize("iterations", [1, 2, 40])
+def test_the_full_step_is_that_of_the_configuration(
+    fisher: str, explicit: Callable, damping: float, iterations: int
+) -> None:
+    """k conjugate gradients minimise ½ xᵀAx − gᵀx over the span of g, Ag, …, Aᵏ⁻¹g; here by a dense solver."""
+    numbers = {"fisher": fisher, "damping": damping, "cg_iters": iterations, "entropy_coef": 0.0}
+    trainer, nets, rollout = started(**numbers)
+    config = trainer.config.algorithm
+    advantage, _ = rollout.advantages(config.gamma, config.gae_lambda)
+    step = trpo.natural_step(nets, rollout, advantage, config)
+    gradient = explicit_gradient(nets, rollout, advantage)
+    for s in range(2):
+        matrix = explicit(nets, rollout, s)
+        matrix = matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype)
+        if iterations == 40:  # more than there are weights
+            x = torch.linalg.solve(matrix, gradient[s])
+        else:
+            span = torch.stack(
+                [torch.linalg.matrix_power(matrix, k) @ gradient[s] for k in range(iterations)], 1
+            )
+            x = span @ torch.linalg.solve(span.T @ matrix @ span, span.T @ gradient[s])
+        expected = (2 * config.max_kl / (x @ matrix @ x)).sqrt() * x
+        assert torch.allclose(step[s], expected, rtol=1e-3, atol=1e-4 * float(expected.abs().max()))
+
+
+@pytest.mark.parametrize("coefficient", [0.5, 0.8])
+def test_the_search_shortens_by_its_factor_as_often_as_it_may(coefficient: float) -> None:
+    trainer, nets, rollout = started(seeds=1, horizon=128, backtrack_coef=coefficient)
+    config = trainer.config.algorithm
+    advantage, _ = rollout.advantages(config.gamma, config.gae_lambda)
+    step = 6 * trpo.natural_step(nets, rollout, advantage, config)  # far too long
+    start = nets.actor.theta.clone()
+    before, old = trpo.surrogate(nets, rollout, advantage, config.entropy_coef)
+
+    def good(length: float) -> bool:
+        nets.actor.theta.copy_(start + length * step)
+        after, new = trpo.surrogate(nets, rollout, advantage, config.entropy_coef)
+        nets.actor.theta.copy_(start)
+        return bool(after > before and nets.policy.law.kl(old, new).mean() <= config.max_kl)
+
+    shortened = next(k for k in range(30) if good(coefficient**k))
+    assert shortened >= 2
+    for tries, fraction in (
+        (shortened, 0.0),
+        (shortened + 1, coefficient**shortened),
+        (30, coefficient**shortened),
+    ):
+        some = dataclasses.replace(config, max_backtracks=tries)
+        search = trpo.line_search(nets, rollout, advantage, step, some)
+        assert search.accepted.tolist() == [fraction > 0]
+        assert search.fraction.item() == pytest.approx(fraction)
+        assert torch.allclose(nets.actor.theta, start + fraction * step)
+        nets.actor.theta.copy_(start)
 
 
 def test_a_step_that_is_good_is_taken_whole() -> None:
