@@ -95,6 +95,17 @@ def test_diagnostics_measure_the_change() -> None:
     assert (abs(record["approx_kl"] - record["kl"]) < 0.5 * record["kl"]).all()
 
 
+def test_steps_beyond_either_side_of_the_clip_are_counted() -> None:
+    trainer = Trainer(small_config(epochs=1, num_epochs=10, learning_rate=1e-2, dtype="float64"), PointEnv)
+    record, rollout = trainer.epoch(), trainer.rollout
+    loc, log_scale = trainer.networks.parameters(rollout.obs)
+    log_prob = torch.distributions.Normal(loc, log_scale.exp()).log_prob(rollout.latent).sum(-1)
+    ratio = (log_prob - rollout.log_prob).exp()
+    above, below = (ratio > 1.2).double().mean(1), (ratio < 0.8).double().mean(1)
+    assert ((above > 0.05) & (below > 0.05)).all()
+    assert record["clip_fraction"] == pytest.approx((above + below).detach().numpy(), abs=1e-12)
+
+
 def test_gradient_clipping_changes_the_run_and_none_means_none() -> None:
     runs = [small_run(small_config(max_grad_norm=norm, epochs=1)) for norm in (None, 1e9, 0.01)]
     assert torch.equal(weights(runs[0]), weights(runs[1]))

@@ -1,3 +1,5 @@
+import dataclasses
+
 import gymnasium
 import numpy as np
 import pytest
@@ -114,12 +116,22 @@ def test_observations_are_normalised_by_what_was_seen_so_far() -> None:
 
 
 def test_episodes_go_on_from_one_rollout_to_the_next() -> None:
-    whole, halves = collector(), collector()
-    long = whole.collect(HORIZON)
-    first, second = halves.collect(50), halves.collect(HORIZON - 50)
-    assert torch.equal(long.reward[:, :50], first.reward)
-    # The second half has other noise, so only the worlds' clocks can agree.
-    assert torch.equal(long.truncated[:, 50:70].any(1), second.truncated[:, :20].any(1))
+    acting = collector(normalize_obs=False)
+    seeds = [stream.environment for stream in acting.streams]
+    first, second = acting.collect(50), acting.collect(HORIZON - 50)  # ten steps into the third episode
+    obs, action, reward, truncated = (
+        torch.cat([getattr(half, name) for half in (first, second)], 1)
+        for name in ("obs", "action", "reward", "truncated")
+    )
+    steps = replay(dataclasses.replace(first, action=action, reward=reward), seeds)
+    for t, (seen, _, rewarded, _, cut, _) in enumerate(steps):
+        assert np.array_equal(obs[:, t], seen)
+        assert np.array_equal(reward[:, t], rewarded)
+        assert np.array_equal(truncated[:, t], cut)
+    assert truncated[:, 59].all()  # episodes of twenty steps
+    assert not truncated[:, 50:59].any()
+    across = reward[:, 40:60].sum(1).tolist()
+    assert [returns[0] for returns in second.episode_returns] == pytest.approx(across)
 
 
 def test_a_poisoned_seed_holds_still() -> None:

@@ -115,6 +115,13 @@ def test_on_robots_too(tmp_path: Path) -> None:
     assert same_records(whole.records, resumed.records)
 
 
+@pytest.mark.parametrize(("mode", "charged"), [("clip", 1.0), ("raw", 4.0)])
+def test_the_robots_are_charged_for_actions_as_the_run_is_configured(mode: str, charged: float) -> None:
+    config = dataclasses.replace(small_config(seeds=2, action_mode=mode), env="HalfCheetah-v5")
+    *_, info = Trainer(config).envs.step(np.full((2, 6), 2.0, np.float32))
+    assert info["reward_ctrl"] == pytest.approx([-0.1 * 6 * charged] * 2)
+
+
 def test_what_a_wrapper_has_gathered_is_not_mixed_with_the_robots_state(tmp_path: Path) -> None:
     """A resumed run with a wrapper starts new episodes, as it says, and does not go on with half of the state."""
     config = small_config(epochs=4)
@@ -336,6 +343,21 @@ def test_a_run_whose_seeds_all_diverge_keeps_its_end(tmp_path: Path) -> None:
         run = train(config, run_dir=tmp_path, make_envs=PointEnv, callback=poison)
     assert run.finished
     assert len(checkpoint.load(tmp_path / checkpoint.FILE_NAME)["records"]) == len(run.records) == 2
+
+
+def test_a_resumed_run_knows_which_seeds_have_diverged(tmp_path: Path) -> None:
+    def poisoned(n: int) -> PointEnv:
+        return PointEnv(n, poisoned=(1,))
+
+    with pytest.warns(DivergedSeedWarning, match=r"seeds \[1\]"):
+        train(small_config(epochs=1), run_dir=tmp_path, make_envs=poisoned)
+    config = small_config(epochs=2)
+    resumed = Trainer(config, poisoned)
+    resumed.load_state_dict(checkpoint.load(tmp_path / checkpoint.FILE_NAME))
+    assert resumed.diverged.tolist() == [False, True, False]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        train(config, run_dir=tmp_path, make_envs=poisoned)  # reported once
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:
