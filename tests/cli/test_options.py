@@ -92,6 +92,7 @@ def test_any_value_can_be_overridden() -> None:
     words += (
         " --policy.limits.log-std-max 0.5 --network.hidden-sizes 32 16 --no-normalize-obs --preset=as-printed"
     )
+    words += " --action-mode raw"
     command = options.parse(words.split())
     assert isinstance(command, options.Train)
     config, printed = command.train_config(), preset("as-printed", "Hopper-v5")
@@ -100,6 +101,7 @@ def test_any_value_can_be_overridden() -> None:
         algorithm=dataclasses.replace(printed.algorithm, clip_range=0.1),
         policy=PolicyConfig(initial_std=0.5, limits=Limits(log_std_max=0.5)),
         network=dataclasses.replace(printed.network, hidden_sizes=(32, 16)),
+        action_mode="raw",
     )
     assert command.run_dir() == Path("runs/Hopper-v5-logit-normal-ppo-as-printed")
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -104,15 +105,19 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "━━━" in text
 
 
+class Run:
+    """All that progress looks at."""
+
+    records: list[dict]
+    config = SimpleNamespace(seeds=(0, 1, 2), algorithm=SimpleNamespace(horizon=4000))
+
+
+def record(*returns: float, diverged: tuple[bool, ...] = (False,) * 3) -> dict:
+    numbers = {name: np.array([0.25, 0.25, np.nan]) for name in ("kl", "saturation")}
+    return {"return_mean": np.array(returns), "diverged": np.array(diverged), **numbers}
+
+
 def test_the_return_of_a_seed_is_the_last_one_known() -> None:
-    class Run:
-        records: list[dict]
-        config = type("Config", (), {"seeds": (0, 1, 2), "algorithm": type("A", (), {"horizon": 4})})
-
-    def record(*returns: float, diverged: tuple[bool, ...] = (False,) * 3) -> dict:
-        numbers = {name: np.array([0.25, 0.25, np.nan]) for name in ("kl", "saturation")}
-        return {"return_mean": np.array(returns), "diverged": np.array(diverged), **numbers}
-
     console = Console(width=200, file=open(os.devnull, "w"), record=True)  # noqa: SIM115
     Run.records = [record(1.0, np.nan, 100.0), record(np.nan, 3.0, np.nan, diverged=(False, False, True))]
     with TrainingProgress(2, console) as progress:
@@ -131,6 +136,28 @@ def test_the_remedy_of_divergence_is_an_option_of_the_algorithm(algo: str, tmp_p
     code, _, err = run(*small(tmp_path / "run", 2, "Hopper-v5", *chosen), "--algorithm.learning-rate", "1e30")
     assert code == 1
     assert f"train with a smaller {' or '.join(STEP_SIZE[algo])} in another --out" in err
+
+
+def test_speed_and_time_left_are_those_of_the_epochs_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that goes on after its tenth epoch: one epoch of 30 s, one of 50 s, and 98 more to come."""
+    clock = SimpleNamespace(perf_counter=iter([1000.0, 1030.0, 1080.0]).__next__)
+    monkeypatch.setattr("inbounds.cli.progress.time", clock)
+    console = Console(width=200, file=open(os.devnull, "w"), record=True)  # noqa: SIM115
+    Run.records = 10 * [record(1.0, 2.0, 3.0)]
+    with TrainingProgress(110, console) as progress:
+        for _ in range(2):
+            Run.records = [*Run.records, record(1.0, 2.0, 3.0)]
+            progress(Run, Run.records[-1])
+    console.file.close()
+    (first, *_, speed, left), (second, *_, mean_speed, less) = (
+        line.split("  ") for line in console.export_text().splitlines()
+    )
+    assert (first, speed, left) == (
+        "epoch 11/110",
+        "400 steps/s",
+        "49:30 left",
+    )  # 3 · 4000 in 30 s; 99 · 30 s
+    assert (second, mean_speed, less) == ("epoch 12/110", "300 steps/s", "1:05:20 left")  # 80 s; 98 · 40 s
 
 
 def test_when_all_seeds_diverge(tmp_path: Path) -> None:
@@ -226,6 +253,23 @@ def test_ctrl_c_twice_ends_at_once_and_says_what_is_kept(
     assert f"stopped in mid-epoch. {tmp_path / 'run'} keeps 2 epochs" in err
     assert len(load_checkpoint(tmp_path / "run")["records"]) == 2
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_under_nohup_a_closed_terminal_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step = checkpoint.save
+
+    def hung_up(path: Path, state: dict) -> None:
+        signal.raise_signal(signal.SIGHUP)
+        step(path, state)
+
+    monkeypatch.setattr(checkpoint, "save", hung_up)
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        succeeds(small(tmp_path / "run", 3))
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert len(load_checkpoint(tmp_path / "run")["records"]) == 3
 
 
 def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) -> None:
@@ -406,11 +450,18 @@ def test_tensorboard_shows_the_curves_once(tmp_path: Path) -> None:
     succeeds(small(tmp_path / "run", 2, "Hopper-v5", "--tensorboard"))
     succeeds(small(tmp_path / "run", 4, "Hopper-v5", "--tensorboard"))
     curves = read_curves(tmp_path / "run")
-    of_seed = curves.filter(np.array(curves["seed"]) == 1)
-    events = accumulator.EventAccumulator(str(tmp_path / "run" / "tensorboard" / "seed-1")).Reload()
-    scalars = events.Scalars("kl")
-    assert [event.step for event in scalars] == of_seed["env_steps"].to_pylist() == [128, 256, 384, 512]
-    np.testing.assert_allclose([event.value for event in scalars], of_seed["kl"].to_numpy(), rtol=1e-6)
+    for seed in (0, 1):
+        of_seed = curves.filter(np.array(curves["seed"]) == seed)
+        events = accumulator.EventAccumulator(str(tmp_path / "run" / "tensorboard" / f"seed-{seed}")).Reload()
+        names = events.Tags()["scalars"]
+        assert {*names} == {*curves.column_names} - {"epoch", "env_steps", "seed"}
+        for name in names:
+            scalars = events.Scalars(name)
+            assert (
+                [event.step for event in scalars] == of_seed["env_steps"].to_pylist() == [128, 256, 384, 512]
+            )
+            expected = of_seed[name].to_numpy(zero_copy_only=False).astype(float)
+            np.testing.assert_allclose([event.value for event in scalars], expected, rtol=1e-6, err_msg=name)
 
 
 def test_tensorboard_without_a_place_for_its_files(tmp_path: Path) -> None:

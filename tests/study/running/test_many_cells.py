@@ -349,9 +349,7 @@ def test_a_full_disk_starts_no_other_cell(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("commit", [False, True])
-def test_what_is_finished_is_committed(
-    commit: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_finished_is_committed(commit: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     committed: list[Cell] = []
     monkeypatch.setattr(
         many_cells, "commit_cell", lambda cell, folder: committed.append(cell) or "git said no"
