@@ -18,7 +18,7 @@ from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, select, study_cells
 from inbounds.study import statistics as study_statistics
 from inbounds.study.analysis import CONTRASTS
-from inbounds.study.grid import ROBOTS
+from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.ledger import (
     CLAIMS,
     Claim,
@@ -35,7 +35,7 @@ from inbounds.study.ledger.evidence import MARGIN, costs, equals, side
 from inbounds.study.ledger.half_of_a_gap import half_left
 from inbounds.study.ledger.shared_names import squash
 from inbounds.study.ledger.verdicts import STATES, State
-from inbounds.study.outcomes import Outcomes
+from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
@@ -498,7 +498,73 @@ def test_a_robot_that_arrives_raises_no_corrected_p(p_values: list[float], gone:
     assert all(late[i] <= early[i] for i in range(6) if i not in gone)
 
 
+class Asked(dict[str, Outcome]):
+    """No finished cell: it notes which are asked for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self.names.add(name)
+        return default
+
+
+@pytest.mark.parametrize("claim", FROM_CELLS, ids=lambda claim: claim.id)
+def test_a_claim_looks_at_the_columns_it_names(claim: Claim) -> None:
+    """And, where its words name algorithms, at those: on all robots, which Holm's correction is over."""
+    asked = Asked()
+    claim.evidence(Outcomes(asked, {}, SHIPPED))
+    looked, named = (
+        {(cell.arm, cell.algorithm, cell.family, cell.variant) for cell in select(names)}
+        for names in (tuple(asked.names), claim.cells)
+    )
+    assert asked.names
+    assert looked <= named
+    said = set(re.findall("TRPO|PPO", claim.says))
+    assert not said or said == {algorithm.upper() for _, algorithm, *_ in named}
+
+
+def outcome_of(cell: Cell, **known: Any) -> Outcome:
+    empty, seeds = np.empty((0, 0)), len(cell.seeds)
+    nothing = Outcome(cell, np.empty(0), empty, empty, np.zeros(seeds, np.bool_), {}, {}, {}, empty, {})
+    return replace(nothing, **known)
+
+
+def test_a_cell_of_which_one_seed_has_a_first_return_is_missing() -> None:
+    (claim,) = claims_named(["start-standard"])
+    rng = np.random.default_rng(0)
+    finished = {
+        cell.id: outcome_of(cell, returns=rng.normal(size=(10, 50)))
+        for cell in select(claim.cells)
+        if cell.robot in ("Hopper", "Ant")
+    }
+    finished["standard-hopper-ppo-gaussian"].returns[1:] = np.nan
+    statements = judge(Outcomes(finished, {}, SHIPPED), claim).statements
+    there = [statement.about for statement in statements if statement.state != "missing"]
+    assert there == ["Ant, PPO, logit-normal − gaussian"]
+
+
 # ---- margins
+
+
+@pytest.mark.parametrize(
+    ("name", "measured", "state"),
+    [
+        ("large-beta", {"at_alpha_max": 0.016, "at_beta_max": 0.005}, "for"),  # 1.05 % of both together
+        ("large-beta", {"at_alpha_max": 0.015, "at_beta_max": 0.004}, "against"),
+        ("large-logit-normal", {"abs_loc_q99": np.log(0.9901 / 0.0099)}, "for"),
+        ("large-logit-normal", {"abs_loc_q99": np.log(0.9899 / 0.0101)}, "against"),
+    ],
+)
+def test_large_begins_where_the_row_says(name: str, measured: dict[str, float], state: State) -> None:
+    """One per cent, by the mean of the last five measurements; what was measured before does not count."""
+    (claim,) = claims_named([name])
+    cell = select(claim.cells)[0]
+    shape = np.linspace(0.9999, 1.0001, 10)[:, None] * (np.arange(51) >= 46)
+    outcome = outcome_of(cell, measured={key: level * shape for key, level in measured.items()})
+    statements = judge(Outcomes({cell.id: outcome}, {}, SHIPPED), claim).statements
+    assert [statement.state for statement in statements if statement.state != "missing"] == [state]
 
 
 def test_equality_needs_the_whole_interval_within_the_margin(made_up: Outcomes) -> None:

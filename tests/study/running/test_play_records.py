@@ -1,6 +1,7 @@
 """What records keep of trained policies' latents: against fifty digits, and never more than the record alone loses."""
 
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import torch
 
 from inbounds.study import run_cell
+from inbounds.study.running import play_records
 from inbounds.study.running.play_records import RECORDS, publish_records, read_records, records_of
 from tests.study.running.test_play_ways import cell_of, short_episodes  # noqa: F401 (a fixture that applies itself)
 from tests.study.small import folder_in, small_cell
@@ -56,3 +58,26 @@ def test_the_files_rows_are_the_policies(tmp_path: Path) -> None:
     assert read_records(folder).keys() == {cell.id, other.id}
     assert [row["wrong"] for row in rows] == kinds["action, bfloat16"]["wrong"].tolist()
     assert [row["steps"] for row in rows] == [40, 40]
+
+
+def test_a_ratio_that_is_no_number_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second seed's policy gives no numbers: none of its steps counts as recalled."""
+
+    class Diverged:
+        def __init__(self, _: Any) -> None:
+            noise = np.random.default_rng(0).normal(size=(7, 2, 3)).astype(np.float32)  # [T, S, A]
+            law = np.stack([np.zeros_like(noise), np.ones_like(noise)])
+            noise[:, 1], law[:, :, 1] = np.nan, np.nan
+            self.latents, self.laws = list(noise), [list(step) for step in law.swapaxes(0, 1)]
+
+        def play(self, *_: Any) -> Any:
+            return np.zeros((2, 1)), np.full((2, 1), 7)
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr(play_records, "run_with_policies", lambda *_: None)
+    monkeypatch.setattr(play_records, "_Recorder", Diverged)
+    rows = records_of(cell_of("logit-normal"), folder_in(tmp_path))
+    assert [row["wrong"] for row in rows if row["seed"] == 1] == [1.0] * len(RECORDS)
+    (whole,) = [row["wrong"] for row in rows if (row["seed"], row["record"]) == (0, "latent, float32")]
+    assert whole == 0.0

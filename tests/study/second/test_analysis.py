@@ -1,9 +1,12 @@
 """The second study's yardsticks and verdicts; `test_independent` repeats its numbers by other means."""
 
+import importlib
 import re
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from inbounds import robots
 from inbounds.study import StudyFolder, second
@@ -16,7 +19,9 @@ from inbounds.study.second.primary import BOUNDED, PERMUTATIONS, RESAMPLES, find
 from inbounds.study.second.secondary import PAIRS, TWINS
 from inbounds.study.second.yardsticks import UNTRAINED
 from inbounds.study.statistics import Estimate, smallest_detectable_effect
-from tests.study.second.test_cells import TEXT
+from tests.study import synthetic
+from tests.study.second import independent
+from tests.study.second.test_cells import NAMES, ROWS, TEXT
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 from tests.study.test_grid import differences
@@ -210,6 +215,98 @@ def test_the_secondary_questions_are_those_of_the_protocol() -> None:
         for pair in pairs:
             for column in (pair.first, pair.second):
                 assert all((*column, robot) in planned for robot in pair.robots)
+
+
+def said_pairs(comparisons: str, block: str) -> Iterator[tuple[object, ...]]:
+    """Read a cell of the protocol's table: pairs of (block, columns' name, number after "at"), and robots."""
+    parts = re.split("[,;] ", comparisons)
+    numbers = [float(x) for part in parts if part.startswith("at ") for x in re.findall(r"[\d.e-]+", part)]
+    for at in numbers or [None]:
+        for part in parts:
+            firsts, _, second_side = part.partition(" − ")
+            for first in firsts.split(" and ") if second_side else ():
+                sides = [name.partition(" of ")[::2] for name in (first, second_side)]
+                yield *((where or block, name, at) for name, where in sides), ROWS[block][3]
+
+
+def test_the_secondary_pairs_are_those_of_the_protocol() -> None:
+    spoken = {law: name for name, law in NAMES.items()}
+    named = {}
+    for block, cells in SECOND.items():
+        for c in cells:
+            policy, at = c.config.policy, {"noise": c.config.policy.initial_std}
+            at |= {"steps": c.config.algorithm.learning_rate} if c.arm == "steps" else {}
+            law = spoken[c.family, policy.state_dependent_std]
+            named[c.arm, c.algorithm, c.family, c.variant, c.robot] = block, law, at.get(c.arm)
+    table = TEXT.partition("| Question |")[2].partition("\n\n")[0]
+    for line in table.splitlines()[2:]:
+        question, comparisons, block = (part.strip() for part in line.strip("|").split("|"))
+        planned = [
+            (
+                *{(named[(*pair.first, r)], named[(*pair.second, r)]) for r in pair.robots}.pop(),
+                "all six" if pair.robots == ROBOTS else ", ".join(pair.robots),
+            )
+            for pair in PAIRS[question]
+        ]
+        assert planned == list(said_pairs(comparisons, block)), question
+
+
+def test_without_those_that_diverged_the_others_are_compared(tmp_path, monkeypatch) -> None:
+    module = importlib.import_module("inbounds.study.second.primary")
+    monkeypatch.setattr(module, "RESAMPLES", 1000)
+    monkeypatch.setattr(module, "PERMUTATIONS", 999)
+    folder = folder_in(tmp_path)
+    blocks = [c for block in ("B", "B, more seeds") for c in SECOND[block] if c.robot == "Hopper"]
+    laws = {("gaussian", "free-std"): "gaussian", ("beta", ""): "beta"}
+    cells = [c for c in blocks if (c.family, c.variant) in laws]
+    write_cells(folder, cells, diverged=(3,))
+    outcomes = Outcomes.read(folder, second_cells())
+    for without, counts in ((False, (20, 4, 0)), (True, (18, 0, 4))):
+        kept = [s for s in range(10) if not (without and s == 3)]
+        last: dict[str, list[float]] = {"gaussian": [], "beta": []}
+        for c in cells:
+            last[laws[c.family, c.variant]] += list(outcomes.finished[c.id].returns[kept, -50:].mean(1))
+        (found,) = [
+            row.difference
+            for row in second.primary(outcomes, without_diverged=without)
+            if (row.law, row.endpoint, row.robot) == ("beta", "final", "Hopper")
+        ]
+        assert found is not None
+        assert (found.n, found.diverged, found.missing) == counts
+        assert found.value == pytest.approx(np.mean(last["beta"]) - np.mean(last["gaussian"]))
+
+
+def test_engines_agree_where_two_one_sided_tests_say_so(tmp_path, monkeypatch) -> None:
+    """Alike; two margins apart; apart by nearly the margin, which ten seeds cannot tell from it."""
+    folder, robot = folder_in(tmp_path), "Hopper"
+    twins = [(ours, theirs) for ours, theirs, where in TWINS if where == robot]
+    ids = {column.cell_id(robot) for pair in twins for column in pair}
+    yardstick = independent.yardsticks()[robot]
+    apart = {"gaussian": 0.0, "beta": 2.0, "logit-normal": 0.9}
+    monkeypatch.setattr(
+        synthetic,
+        "level_of",
+        lambda cell: 2000 + (cell.arm == "equal") * apart[cell.family] * yardstick.margin_final,
+    )
+    write_cells(folder, [cell for cell in all_cells() if cell.id in ids])
+    outcomes = Outcomes.read(folder, all_cells())
+    found = second.engines_agree(outcomes)
+    assert set(found) == {(law, robot, endpoint) for law in apart for endpoint in independent.ENDPOINTS}
+    for ours, theirs in twins:
+        returns = [outcomes.finished[column.cell_id(robot)].returns for column in (ours, theirs)]
+        for endpoint, last, margin in (
+            ("final", 50, yardstick.margin_final),
+            ("area", 500, yardstick.margin_area),
+        ):
+            a, b = (each[:, -last:].mean(1) for each in returns)
+            each = found[ours.family, robot, endpoint]
+            sides = [
+                stats.ttest_ind(a + shift, b, equal_var=False, alternative=way).pvalue
+                for shift, way in ((margin, "greater"), (-margin, "less"))
+            ]
+            assert each.p_value == pytest.approx(max(sides))
+            assert each.difference == pytest.approx(a.mean() - b.mean())
+            assert each.equivalent == (max(sides) < 0.05) == (ours.family == "gaussian")
 
 
 def test_twins_differ_by_engine_and_seeds_alone() -> None:

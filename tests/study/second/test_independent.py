@@ -13,6 +13,7 @@ from scipy import stats
 from inbounds.study import StudyFolder, second, statistics
 from inbounds.study.grid import Cell, second_cells
 from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second import over_robots
 from tests.study import synthetic
 from tests.study.second import independent
 from tests.study.small import folder_in
@@ -36,6 +37,7 @@ def _fewer(monkeypatch: pytest.MonkeyPatch) -> None:
     module = importlib.import_module("inbounds.study.second.primary")
     monkeypatch.setattr(module, "RESAMPLES", FEWER)
     monkeypatch.setattr(module, "PERMUTATIONS", FEWER - 1)
+    monkeypatch.setattr(over_robots, "RESAMPLES", FEWER)
 
 
 def made_up(path: Path, seed: int, monkeypatch: pytest.MonkeyPatch, diverged: tuple[int, ...]) -> StudyFolder:
@@ -117,20 +119,35 @@ def test_the_primary_comparison(seed, diverged, tmp_path, monkeypatch) -> None:
 
 
 def same_aggregates(folder: StudyFolder, root: Path) -> None:
-    outcomes, rng = Outcomes.read(folder, second_cells()), np.random.default_rng(5)
+    outcomes = Outcomes.read(folder, second_cells())
     for endpoint in independent.ENDPOINTS:
         mine = independent.aggregates(root, endpoint, resamples=FEWER)
-        scores = {law: second.normalized(outcomes, column, endpoint) for law, column in COLUMNS.items()}
-        whole = {law for law, by_robot in scores.items() if by_robot is not None}
-        assert whole == set(mine.iqm)
+        found = {law: second.aggregate(outcomes, column, endpoint) for law, column in COLUMNS.items()}
+        assert {law for law, theirs in found.items() if theirs is not None} == set(mine.iqm)
         for law, (value, low, high) in mine.iqm.items():
-            theirs = statistics.aggregate(scores[law], rng, resamples=FEWER)
-            alike(theirs, value, low, high)
+            alike(found[law], value, low, high)
         for law, (value, low, high) in mine.improvement.items():
-            theirs = statistics.probability_of_improvement(
-                scores[law], scores["gaussian"], rng, resamples=FEWER
-            )
-            alike(theirs, value, low, high)
+            alike(second.improvement(outcomes, COLUMNS[law], endpoint), value, low, high)
+
+
+@pytest.mark.parametrize("endpoint", independent.ENDPOINTS)
+def test_aggregates_are_of_the_column_and_endpoint_asked_for(endpoint: str, monkeypatch) -> None:
+    """Skewed scores, other ones for each: IQM and mean differ, and so do the two sides of an improvement."""
+    rng, few = np.random.default_rng(3), {}
+    for column, median in zip(COLUMNS.values(), (1.0, 1.6, 0.7), strict=True):
+        for each in independent.ENDPOINTS:
+            scale = median * (0.5 if each == "area" else 1.0)
+            few[column, each] = {
+                robot: scale * rng.lognormal(0.0, 0.5, 20) for robot in independent.yardsticks()
+            }
+    monkeypatch.setattr(over_robots, "normalized", lambda _, column, each: few[column, each])
+    outcomes = Outcomes({}, {}, StudyFolder())
+    groups = {law: list(few[column, endpoint].values()) for law, column in COLUMNS.items()}
+    for law, column in COLUMNS.items():
+        alike(second.aggregate(outcomes, column, endpoint), *independent.iqm(groups[law], rng, FEWER))
+    for law in independent.LAWS:
+        theirs = second.improvement(outcomes, COLUMNS[law], endpoint)
+        alike(theirs, *independent.improvement(groups[law], groups["gaussian"], rng, FEWER))
 
 
 def alike(theirs: statistics.Estimate, value: float, low: float, high: float) -> None:
