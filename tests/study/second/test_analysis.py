@@ -218,36 +218,35 @@ def test_the_secondary_questions_are_those_of_the_protocol() -> None:
 
 
 def said_pairs(comparisons: str, block: str) -> Iterator[tuple[object, ...]]:
-    """Read a cell of the protocol's table: pairs of (block, columns' name, number after "at"), and robots."""
-    parts = re.split("[,;] ", comparisons)
+    """Read a cell of the protocol's table: both sides as (block, name, number after "at"), and the robots."""
+    parts, where = re.split("[,;] ", comparisons), ROWS[block][3]
+    robots = ROBOTS if where == "all six" else tuple(where.split(", "))
     numbers = [float(x) for part in parts if part.startswith("at ") for x in re.findall(r"[\d.e-]+", part)]
     for at in numbers or [None]:
         for part in parts:
-            firsts, _, second_side = part.partition(" − ")
-            for first in firsts.split(" and ") if second_side else ():
-                sides = [name.partition(" of ")[::2] for name in (first, second_side)]
-                yield *((where or block, name, at) for name, where in sides), ROWS[block][3]
+            firsts, minus, second_side = part.partition(" − ")
+            for first in firsts.split(" and ") if minus else ():
+                sides = (name.partition(" of ")[::2] for name in (first, second_side))
+                yield *((other or block, name, at) for name, other in sides), robots
 
 
 def test_the_secondary_pairs_are_those_of_the_protocol() -> None:
     spoken = {law: name for name, law in NAMES.items()}
-    named = {}
-    for block, cells in SECOND.items():
-        for c in cells:
-            policy, at = c.config.policy, {"noise": c.config.policy.initial_std}
-            at |= {"steps": c.config.algorithm.learning_rate} if c.arm == "steps" else {}
-            law = spoken[c.family, policy.state_dependent_std]
-            named[c.arm, c.algorithm, c.family, c.variant, c.robot] = block, law, at.get(c.arm)
+    found = {
+        Column(c.arm, c.algorithm, c.family, c.variant): (b, c) for b, cells in SECOND.items() for c in cells
+    }
+
+    def named(column: Column) -> tuple[object, ...]:
+        block, cell = found[column]
+        config, law = cell.config, spoken[cell.family, cell.config.policy.state_dependent_std]
+        if block == "E":
+            return block, law, config.policy.initial_std
+        return block, law, config.algorithm.learning_rate if block == "F" else None
+
     table = TEXT.partition("| Question |")[2].partition("\n\n")[0]
     for line in table.splitlines()[2:]:
         question, comparisons, block = (part.strip() for part in line.strip("|").split("|"))
-        planned = [
-            (
-                *{(named[(*pair.first, r)], named[(*pair.second, r)]) for r in pair.robots}.pop(),
-                "all six" if pair.robots == ROBOTS else ", ".join(pair.robots),
-            )
-            for pair in PAIRS[question]
-        ]
+        planned = [(named(pair.first), named(pair.second), pair.robots) for pair in PAIRS[question]]
         assert planned == list(said_pairs(comparisons, block)), question
 
 
