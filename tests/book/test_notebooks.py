@@ -133,6 +133,15 @@ def nbval(folder: Path, *options: str) -> subprocess.CompletedProcess:
     )
 
 
+def test_a_notebook_can_be_computed_as_on_an_old_processor(tmp_path: Path) -> None:
+    notebook = small_notebook(tmp_path)
+    notebook.cells[1].source = "import torch\n\nprint(torch.backends.cpu.get_cpu_capability())"
+    notebook.cells[1].outputs[0].text = "DEFAULT\n"
+    nbformat.write(notebook, tmp_path / "chapter.ipynb")
+    done = nbval(tmp_path, "--other-processor")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_untouched_copy_passes(tmp_path: Path) -> None:
     small_notebook(tmp_path)
     done = nbval(tmp_path)
