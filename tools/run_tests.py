@@ -42,7 +42,7 @@ MAY_SKIP = {
 """What `tests/book/live/conftest.py` says of a machine without npm."""
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
 NBVAL = ["-p", "tests.nbval_rules", "--nbval"]
-# Runs of a robot part where one number is rounded otherwise. PyTorch, MKL and OpenBLAS without their vector units do it.
+# Runs of a robot part where one number is rounded otherwise, as PyTorch, MKL and OpenBLAS do it without vector units.
 OLD_PROCESSOR = {"ATEN_CPU_CAPABILITY": "default", "MKL_CBWR": "COMPATIBLE", "OPENBLAS_CORETYPE": "Nehalem"}
 
 

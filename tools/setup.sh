@@ -87,6 +87,7 @@ fi
 
 free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
 [ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
+[ "$free_kb" -gt 8000000 ] || say "Only $((free_kb / 1000000)) GB of disk are free: enough for PyTorch's CPU build (INSTALL.md says how to ask for it), not for the one with CUDA"
 
 # A folder that was moved or copied brings commands that call the Python of the old place: start anew.
 at_home() { head -n 1 .venv/bin/pip 2>/dev/null | grep -qF "$PWD/.venv/"; }
@@ -99,7 +100,7 @@ fi
 rm -f "$stamp"
 # shellcheck disable=SC2046
 install_system_packages .venv/bin/python $(xargs < apt.txt)
-say "Installing the pinned packages (a few minutes the first time)"
+say "Installing the pinned packages (the first time a few minutes to a quarter of an hour, a gigabyte or more to download)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[book,lab,test]' ||
   fail "pip could not install the packages. Check the network (or the proxy and index settings of pip), then run the same command again: it goes on where it stopped"
 .venv/bin/python -m pip check --disable-pip-version-check >/dev/null || fail "the installed packages contradict each other: run  make distclean  and try again"

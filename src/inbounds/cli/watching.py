@@ -73,6 +73,8 @@ def run(command: Watch) -> int:
     episodes = {0: "an episode under way", 1: f"one whole episode: {over}"}.get(
         count, f"{count} episodes: {over}"
     )
+    if count and not math.isclose(film.total_reward, sum(envs.return_queue), abs_tol=1e-3):
+        episodes += ", and one under way"
     print(f"return {film.total_reward:.1f} in {len(film.frames) / film.fps:.1f} s ({episodes})")
     print(f"film: {path}")
     return 0
