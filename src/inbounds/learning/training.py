@@ -205,8 +205,7 @@ class Trainer:
         """Go back to a state from `state_dict` of a run with the same configuration.
 
         Raises:
-            ValueError: another configuration wrote it (more epochs than planned then are allowed), or the environment
-                has other observations or actions than it had. Nothing has been loaded then.
+            ValueError: it is of another configuration (but for more epochs) or environment; nothing is loaded then.
         """
         if different := changed_fields(self.config, state["config"], FREE_TO_CHANGE):
             changes = "; ".join(f"{name}: {stored} → {ours}" for name, (stored, ours) in different.items())
@@ -248,8 +247,7 @@ def train(
         The trainer, its run finished, with `records`, `networks`, `diverged`, `collector`.
 
     Raises:
-        ValueError: the run directory belongs to another configuration, or its checkpoint is damaged
-            (`DamagedFileError`).
+        ValueError: the run directory is of another configuration, or its checkpoint damaged (`DamagedFileError`).
         BlockingIOError: another process or thread trains in the run directory.
         OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
 

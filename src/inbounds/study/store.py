@@ -316,8 +316,6 @@ def make(path: str | Path) -> str:
     """Return how a result is made, which depends on its folder.
 
     Example:
-        >>> make("results/cells/standard-ant-ppo-beta.parquet")
-        'run the cell (inbounds study run standard-ant-ppo-beta)'
         >>> make("results/motions.safetensors")
         'play the robots (python -m inbounds.book.motions)'
     """
