@@ -34,12 +34,12 @@ WORKERS = max(3, min(4, os.cpu_count() or 1))
 PARALLEL = ["-n", str(WORKERS), "--dist", "loadscope", "--no-loadscope-reorder", "-p", "tests.longest_first"]
 HERE = "not pages and not mutants"
 """The other tests have a target of their own: `make pages`, `make mutants`."""
-# Part of a test's reason to be skipped → what the summary says of all such tests.
+# Part of a test's reason to be skipped, as `tests/book/live/conftest.py` and `test_on_a_gpu.py` give it → what the
+# summary says of all such tests.
 MAY_SKIP = {
     "the live robot is not tested here": "npm cannot be reached: {} tests of the live robot were left out",
     "needs a GPU that torch can use": "torch finds no GPU: {} tests of one were left out",
 }
-"""What `tests/book/live/conftest.py` says of a machine without npm."""
 # `-p tests.nbval_rules` says which outputs are compared; warnings inside a notebook reach it through stderr.
 NBVAL = ["-p", "tests.nbval_rules", "--nbval"]
 # Runs of a robot part where one number is rounded otherwise, as PyTorch, MKL and OpenBLAS do it without vector units.

@@ -268,8 +268,8 @@ def _ledger(command: Ledger, console: Console) -> int:
         ]
         lines += [f"  judged anew: {anew}"] if (anew := quotes.judged_anew(found)) else []
         lines += [f"    {statement}" for statement in found.statements]
-        states = {cell: outcomes.states[cell.id] for cell in select(claim.cells)} if claim.cells else {}
-        others = {cell.id: state for cell, state in states.items() if state != "finished"}
+        planned = select(claim.cells) if claim.cells else ()
+        others = {c.id: state for c in planned if (state := outcomes.states[c.id]) != "finished"}
         if others:
             lines.append(
                 f"  {found.cells} cells are finished; the others: inbounds study run {' '.join(others)}"

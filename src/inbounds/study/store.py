@@ -33,8 +33,8 @@ from inbounds.study.cell import Cell, digest_of
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
 CHECKSUMS_FILE = "checksums.txt"
 OF_MANY_CELLS = ("nothing", "records")
-MOTIONS = "motions.safetensors"
 """Files of `evaluations` that are of no one cell."""
+MOTIONS = "motions.safetensors"
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
 EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {

@@ -134,9 +134,8 @@ class Policy:
     def action(self, latent: NDArray[Any]) -> NDArray[Any]:
         """Return the action `[..., A]`, in the robot's units, that latents `[..., A]` stand for, not yet clipped."""
         unit = self.unit_action(latent)
-        precision = np.result_type(
-            unit, self.dtype
-        )  # far from zero a box may need more digits than latents have
+        # Far from zero a box may need more digits than latents have.
+        precision = np.result_type(unit, self.dtype)
         centre, half_range = self.centre.astype(precision), self.half_range.astype(precision)
         return centre + half_range * unit
 
