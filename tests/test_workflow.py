@@ -65,10 +65,18 @@ def test_pages_are_those_of_a_push_that_passed() -> None:
     assert "workflow_run.event == 'push' && github.event.workflow_run.conclusion == 'success'" in rule
 
 
+def test_a_release_is_what_passed() -> None:
+    jobs = read("release.yml")["jobs"]
+    (check,) = [name for name, job in jobs.items() if "uses" in job]
+    assert jobs[check]["uses"] == f"./{WORKFLOWS['ci.yml'].relative_to(ROOT)}"
+    assert "workflow_call" in read("ci.yml")[True]
+    assert all({check, "build"} <= ancestors(jobs, job) for job in ("github", "pypi"))
+
+
 @pytest.mark.parametrize("name", WORKFLOWS)
 def test_every_action_has_a_version(name: str) -> None:
     for job in read(name)["jobs"].values():
-        for step in job["steps"]:
+        for step in job.get("steps", []):
             assert re.fullmatch(r"[\w./-]+@(v\d+|release/v\d+)", step.get("uses", "a@v1")), step
 
 
@@ -76,7 +84,7 @@ def test_every_action_has_a_version(name: str) -> None:
 def test_what_a_workflow_calls_is_there(name: str) -> None:
     targets = set(re.findall(r"^(\w+):.*##", (ROOT / "Makefile").read_text(encoding="utf8"), re.MULTILINE))
     for job in read(name)["jobs"].values():
-        for step in job["steps"]:
+        for step in job.get("steps", []):
             for target in re.findall(r"\bmake (\w+)", step.get("run", "")):
                 assert target in targets
             for script in re.findall(r"\bpython (\S+\.py)", step.get("run", "")):

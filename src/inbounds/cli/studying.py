@@ -1,4 +1,4 @@
-"""`inbounds study run | resume | status | evaluate | report | ledger | verify`: what the words of the CLI do."""
+"""`inbounds study run | resume | status | evaluate | report | ledger | verify | dial`: what the words of the CLI do."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, Union
+from typing import Annotated, Any, Self, TypeAlias, Union
 
 import tyro
 from rich.console import Console
@@ -123,6 +123,11 @@ class Verify(_WhereAll):
     """Of that choice."""
 
 
+@dataclass(frozen=True)
+class Dial:
+    """A small task with three knobs, and when the law matters there: `inbounds study dial --help`."""
+
+
 StudyCommand: TypeAlias = Run | Resume | Status | Evaluate | Report | Ledger | Verify
 COMMANDS: dict[str, type[StudyCommand]] = {
     "run": Run,
@@ -162,11 +167,9 @@ def study(args: Sequence[str]) -> int:
 
         return dial(args[1:])
     read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
-    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
-    description = (
-        "The two studies of the book: algorithms, families and robots, ten seeds a cell. "
-        "inbounds study dial: a small task, and when the law matters there."
-    )
+    named = (*COMMANDS.items(), ("dial", Dial))  # which has a command line of its own, above
+    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in named)
+    description = "The two studies of the book: algorithms, families and robots, ten seeds a cell."
     console = Console(highlight=False, force_jupyter=False)
     try:
         command: StudyCommand = read(
@@ -244,11 +247,11 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
         raise StudyError(
             f"the report needs Matplotlib and Jinja2 ({error}): pip install '.[report]' in the source tree"
         ) from error
-    with console.status("reading the cells"):
+    with _Now(console, "reading the cells"):
         outcomes = Outcomes.read(command.folder(), cells)
     try:
-        with console.status("writing") as now:
-            path = write_report(outcomes, command.out, lambda section: now.update(f"writing: {section}"))
+        with _Now(console, "writing") as now:
+            path = write_report(outcomes, command.out, lambda section: now.say(f"writing: {section}"))
     except OSError as error:
         raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
     console.print(f"{len(outcomes.finished)} of {len(cells)} cells are finished", markup=False)
@@ -293,9 +296,32 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
         finished = [cell for cell in cells if command.folder().state(cell) == "finished"]
         chooser = random.Random(command.random_seed)
         rerun = tuple(chooser.sample(finished, min(command.random, len(finished))))
-    findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
+    with _Now(console, "looking into the files, and running first epochs again"):
+        findings = verify(cells, command.folder(), epochs=command.epochs, rerun=rerun, on_finding=show)
     findings += check_ways(cells if rerun is None else rerun, command.folder(), show)
     return 0 if all(finding.ok for finding in findings) else 1
+
+
+class _Now:
+    """What is being done, while it is done: a line that turns on a terminal, plain lines elsewhere."""
+
+    def __init__(self, console: Console, doing: str) -> None:
+        self._console, self._doing, self._status = console, doing, console.status(doing)
+
+    def __enter__(self) -> Self:
+        self._status.start()
+        if not self._console.is_terminal:
+            self._console.print(self._doing, markup=False, soft_wrap=True)
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._status.stop()
+
+    def say(self, doing: str) -> None:
+        """Say what is done now."""
+        self._status.update(doing)
+        if not self._console.is_terminal:
+            self._console.print(doing, markup=False, soft_wrap=True)
 
 
 def _no_folder(results: Path) -> str:

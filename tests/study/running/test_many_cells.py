@@ -427,7 +427,12 @@ def test_the_command_line_names_the_fix(tmp_path: Path, capsys: pytest.CaptureFi
     assert study(["status", "no-such-cell"]) == 2
     assert "no cell matches no-such-cell: use an arm" in capsys.readouterr().err
     assert study(["verify", "--results", str(tmp_path)]) == 1
-    assert "nothing is finished here: another --results?" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert said.startswith("looking into the files")
+    assert "nothing is finished here: another --results?" in said
+    with pytest.raises(SystemExit):
+        study(["--help"])
+    assert "{run,resume,status,evaluate,report,ledger,verify,dial}" in capsys.readouterr().out
     for wrong in ("--random=-1", "--epochs 0"):
         assert study(["verify", *wrong.split()]) == 2
         assert "--random takes 0 or more cells" in capsys.readouterr().err
