@@ -46,6 +46,12 @@ def one_sided(loc, scale, loc_new, scale_new, edges):
     return np.sum(p * np.log(p / q))
 
 
+def with_tails(loc, scale, loc_new, scale_new, edges):
+    """From the side on which a difference keeps its digits, and without logarithms."""
+    p, q = (np.exp(log_probabilities(*law, edges)) for law in ((loc, scale), (loc_new, scale_new)))
+    return np.sum(p * np.log(p / q))
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -56,6 +62,7 @@ def one_sided(loc, scale, loc_new, scale_new, edges):
         (lambda *a: -binned(*a), "sign"),
         (lambda *a: binned(*a) / np.log(2), "nats"),
         (one_sided, "Φ(−9) is not"),
+        (with_tails, "take logarithms"),
         (lambda *a: 0.0, "expected"),
     ],
 )

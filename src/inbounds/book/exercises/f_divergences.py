@@ -18,8 +18,8 @@ def binned_kl(function: Callable[..., Any]) -> Judgement:
     def case(
         loc: float, scale: float, loc_new: float, scale_new: float, edges: list[float], **known: Any
     ) -> Case:
-        old, new = _probabilities(loc, scale, edges), _probabilities(loc_new, scale_new, edges)
-        inner = [np.array(x[1:-1]) / float(sum(x[1:-1])) for x in (old, new)]
+        old, new = _log_probabilities(loc, scale, edges), _log_probabilities(loc_new, scale_new, edges)
+        inner = [x[1:-1] - np.logaddexp.reduce(x[1:-1]) for x in (old, new)]
         full = np.log(scale_new / scale) + (scale**2 + (loc - loc_new) ** 2) / (2 * scale_new**2) - 0.5
         mistakes = {
             "that is the Gaussians' divergence: sum over the bins instead": full,
@@ -42,16 +42,28 @@ def binned_kl(function: Callable[..., Any]) -> Judgement:
             [-1.0, 0.0, 9.0],
             hint="under the new law the last bin has probability 10⁻¹⁹: 1 − Φ(9) is 0 in floating point, Φ(−9) is not",
         ),
+        case(
+            0.0,
+            1.0,
+            45.0,
+            1.0,
+            [-1.0, 0.0, 1.0],
+            hint="under the new law three bins have probabilities that are 0 in floating point: take logarithms",
+        ),
     ]
     return judge_cases(function, cases, "right, and in the far tail too")
 
 
-def _probabilities(loc: float, scale: float, edges: list[float]) -> NDArray[Any]:
-    """The probabilities of the bins; above the middle a difference of upper tails, which keeps its digits."""
+def _log_probabilities(loc: float, scale: float, edges: list[float]) -> NDArray[Any]:
+    """The logarithms of the bins' probabilities; above the middle from upper tails, which keep their digits."""
     law, ends = stats.norm(loc, scale), np.array([-np.inf, *edges, np.inf])
-    return np.where(ends[:-1] > loc, -np.diff(law.sf(ends)), np.diff(law.cdf(ends)))
+    upper = ends[:-1] > loc
+    more = np.where(upper, law.logsf(ends[:-1]), law.logcdf(ends[1:]))
+    less = np.where(upper, law.logsf(ends[1:]), law.logcdf(ends[:-1]))
+    return more + np.log1p(-np.exp(less - more))
 
 
 def _kl(p: Any, q: Any) -> float:
+    """The divergence of two laws, of which the logarithms of the probabilities are given."""
     p, q = np.asarray(p), np.asarray(q)
-    return float(np.sum(p * np.log(p / q)))
+    return float(np.sum(np.exp(p) * (p - q)))
