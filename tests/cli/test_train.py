@@ -479,7 +479,7 @@ def test_tensorboard_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.delitem(sys.modules, "torch.utils.tensorboard", raising=False)
     code, _, err = run(*small(tmp_path / "run", 1, "Hopper-v5", "--tensorboard"))
     assert code == 1
-    assert "pip install tensorboard" in err
+    assert "pip install '.[tensorboard]'" in err
     assert not (tmp_path / "run").exists()
 
 

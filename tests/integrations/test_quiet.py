@@ -1,5 +1,7 @@
 """A quiet start: the untrained policy executes the standard deviation asked for, in every library."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -76,6 +78,15 @@ def test_a_second_call_sets_another_noise_and_nothing_else() -> None:
     quiet_start(model, 0.3), quiet_start(quiet_start(again, 0.4), 0.3)
     for one, other in zip(model.policy.parameters(), again.policy.parameters(), strict=True):
         assert torch.equal(one, other)
+
+
+def test_a_second_call_after_loading_does_not_scale_again(tmp_path: Path) -> None:
+    env = TransformAction(Tank(), lambda a: a, spaces.Box(-100, 100, (2,)))
+    model = quiet_start(PPO("MlpPolicy", env, n_steps=128, device="cpu", seed=1), 0.4)
+    model.save(tmp_path / "model")
+    loaded = quiet_start(PPO.load(tmp_path / "model", device="cpu"), 0.3)
+    assert torch.equal(model.policy.action_net.weight, loaded.policy.action_net.weight)
+    assert not torch.equal(model.policy.log_std, loaded.policy.log_std)
 
 
 @pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])

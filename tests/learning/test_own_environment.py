@@ -1,5 +1,7 @@
 """What a reader's own box may look like: its units do not matter, and neither does its asymmetry."""
 
+import dataclasses
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -8,6 +10,10 @@ import pytest
 import torch
 from gymnasium.vector.utils import batch_space
 
+from inbounds import robots
+from inbounds.learning import PolicyConfig, PPOConfig, Trainer, executed_std, read_curves, save_run, train
+from inbounds.learning.families.policy import Policy
+from inbounds.learning.storage.run_store import config_of, save_policies
 from tests.learning.point import PointEnv
 from tests.learning.small import ALGORITHMS, FAMILIES, small_config, small_run, weights
 
@@ -41,3 +47,60 @@ def test_a_box_is_a_choice_of_units(family: str, algo: str, monkeypatch: pytest.
         assert np.array_equal(mine["saturation"], other["saturation"])
         assert np.allclose(mine["action_std"], other["action_std"])
         assert np.allclose(mine["return_mean"], other["return_mean"])
+
+
+class HidesAGenerator(PointEnv):
+    """Its state holds what no checkpoint keeps."""
+
+    def _get_state(self) -> Any:
+        return {"rng": np.random.default_rng(0)}
+
+
+def test_a_state_that_no_checkpoint_keeps_is_told_before_the_first_epoch(tmp_path: Path) -> None:
+    epochs: list[int] = []
+    with pytest.raises(TypeError, match=r"cannot keep state\['collector'\]\['envs'\]\['rng'\]"):
+        train(
+            small_config(),
+            run_dir=tmp_path,
+            make_envs=HidesAGenerator,
+            callback=lambda trainer, _: epochs.append(len(trainer.records)),
+        )
+    assert epochs == []
+
+
+def test_environments_do_not_clip_behind_a_raw_configuration() -> None:
+    config = small_config(action_mode="raw")
+    with pytest.raises(ValueError, match='action_mode="raw": make the environments with it, too'):
+        Trainer(config, lambda n: robots.make("Hopper-v5", n))
+    assert Trainer(config, lambda n: robots.make("Hopper-v5", n, action_mode="raw")).config == config
+
+
+def test_a_run_that_is_longer_than_what_is_asked_for_keeps_its_length(tmp_path: Path) -> None:
+    config = small_config(epochs=3)
+    for epochs in (3, 1):
+        run = train(dataclasses.replace(config, epochs=epochs), run_dir=tmp_path, make_envs=PointEnv)
+        save_run(tmp_path, run)
+        curves = read_curves(tmp_path)
+        assert config_of(curves).epochs == 3
+        assert curves.num_rows == 3 * len(config.seeds)
+
+
+def test_what_is_of_another_type_or_size_is_named() -> None:
+    with pytest.raises(ValueError, match="learning_rate must be a number, got '3e-4'"):
+        PPOConfig(learning_rate="3e-4")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="state_dependent_std must be True or False"):
+        PolicyConfig("gaussian", state_dependent_std="false")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="limits must be a Limits"):
+        PolicyConfig("beta", limits={"concentration_max": 20.0})  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="initial_std must be positive"):
+        PolicyConfig("beta", initial_std=0.0)
+    with pytest.raises(ValueError, match="a scale must be positive"):
+        executed_std("gaussian", 0.0)
+    with pytest.raises(ValueError, match="3 action dimensions take 6 outputs, not 2"):
+        Policy(PolicyConfig(), -np.ones(3), np.ones(3)).greedy(torch.zeros(5, 2), "mean")
+
+
+def test_a_seed_that_a_run_does_not_have_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"the run has the seeds \[0, 1, 2\], not \[7\]"):
+        save_policies(tmp_path / "policies", Trainer(small_config(), PointEnv), seeds=[7])
+    assert not list(tmp_path.iterdir())

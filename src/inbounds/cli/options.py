@@ -18,6 +18,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from inbounds.cli.errors import CommandError
 from inbounds.learning import PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
+from inbounds.learning.families.policy import family_of
 
 DESCRIPTION = (
     "Policy gradients on bounded action spaces: train policies over seeds in lockstep, film them, measure. "
@@ -46,10 +47,14 @@ def parse_seeds(text: str) -> tuple[int, ...]:
         >>> parse_seeds("3"), parse_seeds("3,"), parse_seeds("0,7"), parse_seeds("10-13")
         ((0, 1, 2), (3,), (0, 7), (10, 11, 12, 13))
     """
+    named: tuple[int, ...] = ()
     try:
         if "," in text:
-            return tuple(int(part) for part in text.split(",") if part)
-        if "-" in text:
+            named = tuple(int(part) for part in text.split(",") if part)
+            if not named:
+                raise ValueError
+            first, last = 0, len(named) - 1
+        elif "-" in text:
             first, last = map(int, text.split("-"))
             if first > last:
                 raise ValueError
@@ -57,11 +62,13 @@ def parse_seeds(text: str) -> tuple[int, ...]:
             first, last = 0, int(text) - 1
     except ValueError:
         raise ValueError(
-            f"{text!r} names no seeds: give a number of seeds (10), some of them (0,7) or a range (10-19)"
+            f"{text[:80]!r} names no seeds: give a number of seeds (10), some of them (0,7) or a range (10-19)"
         ) from None
     if last - first >= MOST_SEEDS:
-        raise ValueError(f"{text!r} asks for {last - first + 1} seeds; one run holds at most {MOST_SEEDS}")
-    return tuple(range(first, last + 1))
+        raise ValueError(
+            f"{text[:80]!r} asks for {last - first + 1} seeds; one run holds at most {MOST_SEEDS}"
+        )
+    return named or tuple(range(first, last + 1))
 
 
 def format_seeds(seeds: Sequence[int]) -> str:
@@ -252,10 +259,12 @@ def _train_defaults(args: Sequence[str]) -> Train:
     look = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     look.add_argument("--preset", default="common")
     look.add_argument("--algo", default="ppo")
+    look.add_argument("--policy", default="logit-normal")
     try:
         seen, _ = look.parse_known_args(args)
         config = preset(seen.preset, algo=seen.algo)
         _forbid_options_of_others(args, seen.algo)
+        _forbid_limits_of_others(args, seen.policy)
     except (argparse.ArgumentError, ValueError):  # tyro will say what is wrong
         config = preset("common")
     return Train(**_values(config) | {"policy": PolicyOptions(**_values(config.policy))})
@@ -270,6 +279,16 @@ def _forbid_options_of_others(args: Sequence[str], algo: str) -> None:
         if option.startswith("--algorithm.") and owners and algo not in owners:
             remedy = " or ".join(f"--algo {owner}" for owner in owners)
             raise CommandError(f"{option} is no option of {algo}: add {remedy}", exit_code=2)
+
+
+def _forbid_limits_of_others(args: Sequence[str], family: str) -> None:
+    """Raise a CommandError for a limit that this family's law has no parameter for."""
+    has_scale = "log_scale" in family_of(family).law.named.names()
+    for word in args:
+        option = word.partition("=")[0].replace("_", "-")
+        of_scale = option in ("--policy.limits.log-std-min", "--policy.limits.log-std-max")
+        if (of_scale and not has_scale) or (option == "--policy.limits.concentration-max" and has_scale):
+            raise CommandError(f"{option} limits nothing of {family}: leave it out", exit_code=2)
 
 
 def _values(config: Any) -> dict[str, Any]:

@@ -31,7 +31,9 @@ class TensorBoardWriter:
         try:
             from torch.utils.tensorboard import SummaryWriter
         except ImportError as error:
-            raise CommandError("--tensorboard needs TensorBoard: pip install tensorboard") from error
+            raise CommandError(
+                "--tensorboard needs TensorBoard: pip install '.[tensorboard]' in the source tree"
+            ) from error
         make: Any = SummaryWriter
         try:
             self._writers = [make(str(directory / f"seed-{seed}"), purge_step=0) for seed in seeds]

@@ -149,6 +149,9 @@ class _Session:
                 if not (is_ours(error) or is_disk_full(error)):
                     raise  # the environment's own
                 raise self._unwritten(error) from error
+            except Exception:  # the environment's own, too
+                progress.say(self._kept("stopped by an error"))
+                raise
         return self._conclude(trainer, start)
 
     def _after_epoch(self, trainer: Trainer, record: Record, watchers: list[Any]) -> None:

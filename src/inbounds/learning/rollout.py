@@ -314,16 +314,17 @@ def evaluate(networks: ActorCritic, obs: Tensor, latent: Tensor) -> tuple[Parame
     return parameters, log_prob, networks.values(obs).contiguous()
 
 
-def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
+def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: ActionMode = "clip") -> None:
     """Raise unless the environments are ones a `Collector` can act in.
 
     Args:
         envs: the environments.
         num_seeds: how many there must be.
+        mode: how the configuration treats actions beyond the box.
 
     Raises:
-        ValueError: no vector environment, another number, another autoreset mode, observations that are no Box, or
-            actions that `require_box` refuses.
+        ValueError: no vector environment, another number, another autoreset mode, observations that are no Box,
+            actions that `require_box` refuses, or that are clipped where the mode is "raw".
     """
     if not hasattr(envs, "num_envs"):
         raise ValueError(
@@ -332,10 +333,11 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int) -> None:
         )
     if envs.num_envs != num_seeds:
         raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
-    mode = envs.metadata.get("autoreset_mode")
-    if mode != AutoresetMode.SAME_STEP:
+    if mode == "raw" and getattr(getattr(envs, "unwrapped", envs), "action_mode", mode) != mode:
+        raise ValueError('the configuration says action_mode="raw": make the environments with it, too')
+    if (reset := envs.metadata.get("autoreset_mode")) != AutoresetMode.SAME_STEP:
         raise ValueError(
-            f"the environments reset in the mode {mode}, which puts dummy transitions into the data: make them with "
+            f"the environments reset in the mode {reset}, which puts dummy transitions into the data: make them with "
             "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP"
         )
     if not isinstance(envs.single_observation_space, gymnasium.spaces.Box):

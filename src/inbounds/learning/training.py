@@ -62,9 +62,8 @@ class Trainer:
         make_envs: makes the vector environment for a number of seeds; None makes `config.env`.
 
     Raises:
-        ValueError: the environments are not ones that a `Collector` can act in, their bounds are not finite and in
-            order, no parameters give the `initial_std` that the policy asks for, or the engine `compiled` is not to be
-            had: the extra `fast` is missing, or the family has no kernels.
+        ValueError: a `Collector` cannot act in the environments, their bounds are not finite and in order, nothing
+            gives the policy's `initial_std`, or there is no engine `compiled`: no extra `fast`, or no kernels.
 
     Example:
         >>> from inbounds.learning.config import preset
@@ -79,7 +78,7 @@ class Trainer:
         self.streams = [SeedStreams.of(seed) for seed in config.seeds]
         num_seeds = len(config.seeds)
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
-        check_environments(self.envs, num_seeds)
+        check_environments(self.envs, num_seeds, config.action_mode)
         box: Any = self.envs.single_action_space
         require_box(box)
         policy = Policy(config.policy, box.low, box.high)
@@ -220,6 +219,7 @@ class Trainer:
         self.collector.load_state_dict(state["collector"])
         restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
         self.records = list(state["records"])
+        self.config = dataclasses.replace(self.config, epochs=max(self.config.epochs, len(self.records)))
         self.diverged = state["diverged"].copy()
 
 
@@ -248,6 +248,7 @@ def train(
 
     Raises:
         ValueError: the run directory is of another configuration, or its checkpoint damaged (`DamagedFileError`).
+        TypeError: the environments' state holds what a checkpoint cannot keep.
         BlockingIOError: another process or thread trains in the run directory.
         OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
 
@@ -272,6 +273,7 @@ def train(
             path = folder / checkpoint.FILE_NAME
             if path.exists():
                 trainer.load_state_dict(checkpoint.load(path))
+            checkpoint.require_keepable(trainer.state_dict())
         while not trainer.finished:
             record = trainer.epoch()
             if path is not None and (len(trainer.records) % config.checkpoint_every == 0 or trainer.finished):
@@ -282,17 +284,14 @@ def train(
 
 
 def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None = None) -> float:
-    """Have everything compiled that a run under the engine `compiled` calls, or loaded from where it is kept.
-
-    The first epoch of a run does so by itself, and takes that much longer.
+    """Have everything compiled, or loaded, that a run under the engine `compiled` calls; else its first epoch does.
 
     Args:
         config: of the run.
         make_envs: as `Trainer` takes it.
 
     Returns:
-        How many seconds it took, some ten the first time and less than one later, where there is a place to keep what
-        is compiled (the package's folder, or the user's cache).
+        How many seconds it took: some ten at first, less than one later where what is compiled can be kept.
 
     Example:
         >>> prepare(TrainConfig("Swimmer-v5")) < 1  # nothing to compile for autograd

@@ -52,7 +52,8 @@ def make(name: str, num_envs: int = 1, **kwargs: Any) -> "RobotVectorEnv":
         The environment.
 
     Raises:
-        ValueError: an argument is not one of those that the class names.
+        ValueError: the class does not take an argument's value.
+        TypeError: it has no such argument.
 
     Example:
         >>> envs = make("Hopper-v5", num_envs=10)

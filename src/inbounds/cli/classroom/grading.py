@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import importlib.util
+import io
 import json
 import math
 import os
@@ -23,6 +24,7 @@ from rich.table import Table
 
 from inbounds.book.pages.graded import grader_shown
 from inbounds.cli.errors import CommandError
+from inbounds.learning.storage.whole_files import write_whole
 
 MOST_GIGABYTES = 1e6
 """More than any machine has, and few enough to count in bytes."""
@@ -224,7 +226,8 @@ def _print(grades: Sequence[Grade]) -> None:
 
 
 def _write(grades: Sequence[Grade], path: Path) -> None:
-    with path.open("w", newline="", encoding="utf8") as file:
-        rows = csv.writer(file)
-        rows.writerow(["notebook", "exercise", "mark", "message"])
-        rows.writerows([found.notebook, found.exercise, found.mark, found.message] for found in grades)
+    text = io.StringIO(newline="")
+    rows = csv.writer(text)
+    rows.writerow(["notebook", "exercise", "mark", "message"])
+    rows.writerows([found.notebook, found.exercise, found.mark, found.message] for found in grades)
+    write_whole(path, text.getvalue().encode("utf8"))  # an older table stays until the new one is whole

@@ -80,6 +80,11 @@ class Limits:
         for name in ("log_std_min", "log_std_max", "concentration_max"):
             # Beside a number of NumPy's, which has a precision, float32 actions would be computed in float64.
             object.__setattr__(self, name, float(getattr(self, name)))
+        if not max(abs(self.log_std_min), abs(self.log_std_max)) < 88:
+            raise ValueError(
+                "log_std_min and log_std_max must lie within ±88, where single precision has a σ, got "
+                f"{self.log_std_min} and {self.log_std_max}"
+            )
         if not self.log_std_min < self.log_std_max:
             raise ValueError(
                 f"log_std_min must be below log_std_max, got {self.log_std_min} and {self.log_std_max}: swap them"

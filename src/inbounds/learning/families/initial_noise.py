@@ -27,12 +27,14 @@ def executed_std(family: str, scale: float) -> float:
         The standard deviation, in units of half the action range; below 1, where all mass is on the bounds.
 
     Raises:
-        ValueError: no family of that name.
+        ValueError: no family of that name, or a scale that is not positive.
 
     Example:
         >>> [round(executed_std(f, 1.0), 4) for f in ("gaussian", "logit-normal", "beta")]
         [0.7184, 0.4166, 0.5774]
     """
+    if not scale > 0:
+        raise ValueError(f"a scale must be positive, got {scale}")
     return family_of(family).executed_std(scale)
 
 

@@ -29,6 +29,7 @@ from torch.distributions import Distribution
 
 from inbounds.learning.families import beta, clipped_gaussian, gaussian, logit_normal
 from inbounds.learning.families.family import Array, Family, Limits, Parameters
+from inbounds.learning.updates.checks import check
 
 ActionMode: TypeAlias = Literal["clip", "raw"]
 
@@ -73,6 +74,9 @@ class PolicyConfig:
     """Executed noise before training, in units of half the action range; None leaves the head's bias as it is."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.limits, Limits):
+            raise ValueError(f"limits must be a Limits, got {self.limits!r}")
+        check(self, positive_or_none=["initial_std"])
         names = family_of(self.family).law.named.names()
         if "log_scale" not in names and not self.state_dependent_std:
             raise ValueError(
@@ -124,7 +128,15 @@ class Policy:
         return type(self), (self.config, self.low.astype(self.dtype), self.high.astype(self.dtype))
 
     def parameters(self, outputs: Array, xp: ModuleType = torch) -> Parameters:
-        """Return the law's parameters `[..., A]` for network outputs `[..., 2A]`."""
+        """Return the law's parameters `[..., A]` for network outputs `[..., 2A]`.
+
+        Raises:
+            ValueError: they are of another number of action dimensions.
+        """
+        if outputs.shape[-1] != 2 * self.act_dim:  # those of one dimension would be broadcast
+            raise ValueError(
+                f"{self.act_dim} action dimensions take {2 * self.act_dim} outputs, not {outputs.shape[-1]}"
+            )
         return self.law.parameters(outputs, self.config.limits, xp)
 
     def unit_action(self, latent: Array, xp: ModuleType = np) -> Array:

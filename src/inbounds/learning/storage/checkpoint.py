@@ -33,6 +33,17 @@ def save(path: Path, state: dict[str, Any]) -> None:
     write_whole(path, buffer.getbuffer())
 
 
+def require_keepable(state: dict[str, Any]) -> None:
+    """Raise a TypeError if `save` would: to be told before hours of training, not after.
+
+    Example:
+        >>> require_keepable({"rng": object()})  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        TypeError: a checkpoint cannot keep state['rng'], of type object: let get_state of the environment return ...
+    """
+    _to_tensors(state)
+
+
 def load(path: Path) -> dict[str, Any]:
     """Read a state from `save`. Nothing in the file is executed.
 

@@ -169,6 +169,8 @@ def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = 
     """
     config, tensors = trainer.config, trainer.tensors()
     if seeds is not None:
+        if unknown := sorted(set(seeds) - set(config.seeds)):
+            raise ValueError(f"the run has the seeds {list(config.seeds)}, not {unknown}")
         rows = [config.seeds.index(seed) for seed in seeds]
         config = dataclasses.replace(config, seeds=tuple(seeds))
         tensors = {n: t if n in OF_THE_BOX else t[rows] for n, t in tensors.items()}

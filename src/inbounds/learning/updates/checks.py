@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,8 @@ def check(
     for names, rule, holds in rules:
         for name in names:
             value = getattr(config, name)
+            if value is not None and not isinstance(value, Real):  # YAML reads 3e-4, without a dot, as a word
+                raise ValueError(f"{name} must be a number, got {value!r}")
             if not holds(value):
                 raise ValueError(f"{name} must {rule}, got {value}")
             if name not in _MAY_BE_INFINITE and value == math.inf:
