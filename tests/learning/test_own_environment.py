@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from gymnasium.vector import VectorActionWrapper
 from gymnasium.vector.utils import batch_space
 
 from inbounds import robots
@@ -49,6 +50,13 @@ def test_a_box_is_a_choice_of_units(family: str, algo: str, monkeypatch: pytest.
         assert np.allclose(mine["return_mean"], other["return_mean"])
 
 
+class Squash(VectorActionWrapper):
+    """A map of one's own, into the box of the robots."""
+
+    def actions(self, actions: Any) -> Any:
+        return np.tanh(actions)
+
+
 class HidesAGenerator(PointEnv):
     """Its state holds what no checkpoint keeps."""
 
@@ -73,6 +81,10 @@ def test_environments_do_not_clip_behind_a_raw_configuration() -> None:
     with pytest.raises(ValueError, match='action_mode="raw": make the environments with it, too'):
         Trainer(config, lambda n: robots.make("Hopper-v5", n))
     assert Trainer(config, lambda n: robots.make("Hopper-v5", n, action_mode="raw")).config == config
+    squashed = Trainer(
+        config, lambda n: Squash(robots.make("Hopper-v5", n))
+    )  # which maps actions into the box
+    assert np.isfinite(squashed.epoch()["kl"]).all()
 
 
 def test_a_run_that_is_longer_than_what_is_asked_for_keeps_its_length(tmp_path: Path) -> None:

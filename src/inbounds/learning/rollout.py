@@ -324,7 +324,7 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: Act
 
     Raises:
         ValueError: no vector environment, another number, another autoreset mode, observations that are no Box,
-            actions that `require_box` refuses, or that are clipped where the mode is "raw".
+            actions that `require_box` refuses, or that they clip themselves where the mode is "raw".
     """
     if not hasattr(envs, "num_envs"):
         raise ValueError(
@@ -333,7 +333,8 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: Act
         )
     if envs.num_envs != num_seeds:
         raise ValueError(f"one environment per seed: make {num_seeds} instead of {envs.num_envs}")
-    if mode == "raw" and getattr(getattr(envs, "unwrapped", envs), "action_mode", mode) != mode:
+    wrapped = getattr(envs, "unwrapped", envs) is not envs  # a wrapper may map actions into the box
+    if mode == "raw" and not wrapped and getattr(envs, "action_mode", mode) != mode:
         raise ValueError('the configuration says action_mode="raw": make the environments with it, too')
     if (reset := envs.metadata.get("autoreset_mode")) != AutoresetMode.SAME_STEP:
         raise ValueError(

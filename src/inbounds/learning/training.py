@@ -291,7 +291,7 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
         make_envs: as `Trainer` takes it.
 
     Returns:
-        How many seconds it took: some ten at first, less than one later where what is compiled can be kept.
+        How many seconds it took, some ten at first, less than one later where what is compiled can be kept.
 
     Example:
         >>> prepare(TrainConfig("Swimmer-v5")) < 1  # nothing to compile for autograd
