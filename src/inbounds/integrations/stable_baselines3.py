@@ -223,9 +223,8 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
             policy.action_net.bias.zero_()
         else:
             half, weight = (high - low) / 2, policy.action_net.weight
-            if (
-                policy.log_std == policy.log_std_init
-            ).all():  # else it is a second call: that sets another std alone
+            # A second call, perhaps after loading, sets another std alone.
+            if (policy.log_std == policy.log_std_init).all():
                 weight.mul_(half[:, None].to(weight))
             policy.log_std.copy_((half * quiet_scale(ClippedNormal, std)).log())
             policy.action_net.bias.copy_((high + low) / 2)
