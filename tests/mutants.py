@@ -57,7 +57,7 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "every quiet start scales the weights",
         "integrations/stable_baselines3.py",
-        'if (policy.log_std == policy.log_std_init).all():',
+        "if (policy.log_std == policy.log_std_init).all():",
         "if True:",
         "tests/integrations/test_quiet.py::test_a_second_call_sets_another_noise_and_nothing_else",
     ),
