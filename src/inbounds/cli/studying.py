@@ -310,8 +310,7 @@ class _Now:
 
     def __enter__(self) -> Self:
         self._status.start()
-        if not self._console.is_terminal:
-            self._console.print(self._doing, markup=False, soft_wrap=True)
+        self.say(self._doing)
         return self
 
     def __exit__(self, *_error: object) -> None:
