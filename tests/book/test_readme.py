@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from inbounds.book.report import answers, study_pages, ways_to_act
-from inbounds.book.report.equal_start import grade, laws, outcomes_of_both, quiet_starts
+from inbounds.book.report.equal_start import USUAL, exploratory, grade, laws, outcomes_of_both, quiet_starts
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast
 from inbounds.study.outcomes import Outcomes
@@ -48,9 +48,10 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert len(above) == 2
     assert f"with fresh seeds, it takes a Gaussian higher on 2 of {len(ppo)} robots (found)" in said
     assert "and lower on 2 (one found, one suggested)" in said
-    (cheetah,), (humanoid,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Humanoid"))
+    (cheetah,), (swimmer,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Swimmer"))
     assert f"the change is {spoken(cheetah.difference, 0)} points on HalfCheetah" in said
-    assert f"{spoken(humanoid.difference, 0)} on Humanoid" in said
+    assert f"{spoken(swimmer.difference)} on Swimmer, more than a fifth of what training adds" in said
+    assert swimmer.difference.value < -swimmer.margin  # which is a fifth
 
 
 def test_a_law(outcomes: Outcomes) -> None:
@@ -69,22 +70,35 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert not graded["beta", "final", -1]
     assert graded["beta", "area", 1] == {"found with fresh seeds": 1, "suggested": 1}
     assert graded["beta", "area", -1] == {"suggested": 1}
-    assert "Beta ends above a Gaussian on 2 of 6 robots (found), by area above on 2" in said
-    assert "above on 2 (one found, one suggested), below on 1 (suggested)" in said
+    assert (
+        "Both quiet, a Beta ends above a Gaussian on 2 of 6 robots (found; by area above on 2, one found,"
+        in said
+    )
+    assert "one found, below on 1, suggested), a logit-normal below on 1 (by area" in said
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found with fresh seeds": 1}
     assert graded["logit-normal", "area", 1] == {"found with fresh seeds": 1}
     assert graded["logit-normal", "area", -1] == {"found with fresh seeds": 2}
-    assert "a logit-normal ends below on 1 (found), by area above on 1 and below on 2 (found)" in said
+    assert "a logit-normal below on 1 (by area above on 1, below on 2; all found)" in said
+    usual = answers.of(exploratory(outcomes_of_both(outcomes), USUAL, "final"), law="beta")
+    assert [len(side) for side in answers.sides(usual)] == [3, 0]
+    assert len(usual) == 6
+    assert "Against a Gaussian with σ = 1, a quiet Beta: above on 3, below on none (exploratory)." in said
 
 
 def test_the_median() -> None:
     shipped = study_pages.shipped()
     fresh = Outcomes.read(shipped.folder, grid.second_cells())
-    first, second = (ways_to_act.count(ways_to_act.rows_of(each), "mode") for each in (shipped, fresh))
+    rows = [ways_to_act.rows_of(each) for each in (shipped, fresh)]
+    (noise, fresh_noise), (mode, fresh_mode) = (
+        [ways_to_act.count(these, way) for these in rows] for way in ("sample", "mode")
+    )
     said = bullet("Act by the median")
-    assert f"less than its median in {first.below} of {first.cells} cells, and more in {first.above} " in said
-    assert f"with fresh seeds in {second.below} and {second.above} of {second.cells}; not corrected)" in said
+    assert not noise.above + fresh_noise.above
+    assert f"earns less in {noise.below} of {noise.cells} cells, more in none" in said
+    assert f"by its mode less in {mode.below}, more in {mode.above}." in said
+    counts = f"{fresh_noise.below} and none; {fresh_mode.below} and {fresh_mode.above}."
+    assert f"With fresh seeds, of {fresh_mode.cells} cells: {counts} (Not corrected.)" in said
 
 
 def test_the_snippet_runs() -> None:

@@ -1,13 +1,15 @@
 """Graders of the chapter *What happened* (`judging` tells how one works)."""
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from numpy.typing import NDArray
 
 from inbounds.book.exercises.judging import Case, Judgement, judge_cases
 
+Floats = NDArray[np.float64]
 LEVEL = 0.05
 
 
@@ -69,32 +71,50 @@ def _without_stop(gaps: list[float], p_values: list[float]) -> list[int]:
     return _counts(gaps, [p * (len(gaps) - order.index(i)) < LEVEL for i, p in enumerate(p_values)])
 
 
-def half_width(function: Callable[..., Any]) -> Judgement:
-    """Half the width of Student's 95 % interval of the mean over seeds, at each epoch."""
+def scores(function: Callable[..., Any]) -> Judgement:
+    """Interquartile means over robots and seeds together, doing nothing at 0 and the highest mean at 1."""
     rng = np.random.default_rng(0)
 
-    def case(seeds: int, epochs: int, hint: str) -> Case:
-        returns = rng.normal(100, 20, (seeds, epochs)) + 50 * rng.normal(size=(seeds, 1))
-        right = stats.t.ppf(0.975, seeds - 1) * stats.sem(returns, axis=0)
-        normal = 1.96 / stats.t.ppf(0.975, seeds - 1)
-        biased, pooled = np.sqrt((seeds - 1) / seeds), np.sqrt(1 / epochs)
-        errors = {
-            "the quantile is a Normal's, and so few seeds need Student's t": normal,
-            "the standard deviation divides by S, not by S − 1": biased,
-            "epochs are counted as if they were seeds": pooled,
-        }
-        mistakes = {said: right * factor for said, factor in errors.items()}
-        for said, factor in errors.items():
-            rest = normal * biased * pooled / factor
-            mistakes[f"two errors are left; this one is mended: {said}"] = right * rest
-        mistakes["all three errors are still there"] = right * normal * biased * pooled
-        mistakes["that is the interval of a single seed, not of the mean"] = right * np.sqrt(seeds)
-        return Case((returns,), right, mistakes, hint, rtol=1e-4)
+    def case(policies: int, robots: int, seeds: int, hint: str) -> Case:
+        idle = rng.uniform(50, 200, robots)
+        gain = rng.uniform(20, 900, robots) * rng.uniform(0.2, 1, (policies, robots))
+        final = idle[:, None] + gain[..., None] * rng.uniform(0.5, 1.5, (policies, robots, seeds))
+        mistakes = {}
+        for count in range(1, len(BUGS) + 1):
+            for left in itertools.combinations(BUGS, count):
+                mistakes["; ".join(BUGS[bug] for bug in left)] = _scores(final, idle, left)
+        return Case((final, idle), _scores(final, idle), mistakes, hint)
 
     cases = [
-        case(10, 6, "one number per epoch is expected, `[E]`"),
-        case(4, 3, "it must hold for any number of seeds"),
+        case(3, 4, 8, "one number per policy is expected, `[C]`"),
+        case(2, 6, 2, "it must hold for any number of policies, robots and seeds"),
     ]
     return judge_cases(
-        function, cases, "right: seeds are the unit, and Student's quantile knows how few they are"
+        function,
+        cases,
+        "right: doing nothing scores 0, the best mean 1, and all runs of a policy count together",
     )
+
+
+BUGS = {
+    "luck": "1 belongs to the highest mean, not to the luckiest run",
+    "unit": "the unit is the way from doing nothing to the best, not the best itself",
+    "apart": "the middle half is that of all runs of a policy, not of each robot's",
+}
+
+
+def _scores(final: Floats, idle: Floats, bugs: Collection[str] = ()) -> Floats:
+    """By the definition, policy by policy, with any of the three bugs."""
+    best = np.max(final if "luck" in bugs else final.mean(axis=2, keepdims=True), axis=(0, 2))
+    unit = best if "unit" in bugs else best - idle
+    found = []
+    for policy in final:
+        runs = ((policy.T - idle) / unit).T
+        groups = runs if "apart" in bugs else [runs.ravel()]
+        found.append(np.mean([_middle_half(group) for group in groups]))
+    return np.array(found)
+
+
+def _middle_half(values: Floats) -> float:
+    cut = len(values) // 4
+    return float(np.sort(values)[cut : len(values) - cut].mean())

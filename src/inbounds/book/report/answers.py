@@ -119,7 +119,7 @@ def counted(rows: Sequence[Evidence]) -> str:
 
 
 def short(rows: Sequence[Evidence]) -> str:
-    """Return `counted` in fewer words: on how many robots a law is above and below, without grades.
+    """Return `counted` in fewer words, without grades; of how many robots, where not all have run.
 
     Example:
         >>> short([])
@@ -128,18 +128,8 @@ def short(rows: Sequence[Evidence]) -> str:
     if not rows:
         return "not run yet"
     above, below = sides(rows)
-    return f"above on {len(above)} of {len(rows)}, below on {len(below)}"
-
-
-def in_short(final: Sequence[Evidence], area: Sequence[Evidence]) -> str:
-    """Return `short` of the final returns, and of the areas where some are below.
-
-    Example:
-        >>> in_short([], [])
-        'not run yet'
-    """
-    above, below = sides(area)
-    return short(final) + (f" (by area above on {len(above)}, below on {len(below)})" if below else "")
+    ran = "" if len(rows) == len(ROBOTS) else f" (of {len(rows)})"
+    return f"{len(above)} above, {len(below)} below{ran}"
 
 
 def sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
@@ -170,14 +160,22 @@ def in_brackets(rows: Sequence[Evidence]) -> str:
     return f" ({', '.join(known)})" if known else ""
 
 
-def leading(rows: Sequence[Evidence]) -> str:
-    """Return the differences that leave out 0, with their intervals and grades, robot by robot; or that there is none.
+def leading(rows: Sequence[Evidence], *, graded: bool = True) -> str:
+    """Return the differences that leave out 0, with their intervals, robot by robot; or that there is none.
+
+    Args:
+        rows: of one comparison.
+        graded: say how well each is founded.
 
     Example:
         >>> leading([])
         'nowhere'
     """
-    told = [f"{row.robot} {spoken(row.difference)} ({grade(row)})" for row in rows if sign(row)]
+    told = [
+        f"{row.robot} {spoken(row.difference)}{f' ({grade(row)})' if graded else ''}"
+        for row in rows
+        if sign(row)
+    ]
     return "; ".join(told) or "nowhere"
 
 

@@ -36,6 +36,8 @@ Grade: TypeAlias = Literal[
 ]
 LAWS = ("beta", "logit-normal")
 """The bounded ones, in the order of the pages."""
+USUAL = Column("as-they-come", "ppo", "gaussian", FREE)
+"""What people run: a Gaussian with a free σ that starts at 1."""
 
 
 @dataclass(frozen=True)
@@ -178,11 +180,10 @@ def quiet_starts(outcomes: Outcomes) -> list[Evidence]:
         >>> quiet_starts(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))))
         []
     """
-    quiet, plain = GAUSSIAN, Column("as-they-come", "ppo", "gaussian", FREE)
     rows: list[Evidence | None] = []
     for algorithm in ("ppo", "trpo"):
         for endpoint in ENDPOINTS:
-            found = _tested(outcomes, quiet, plain, endpoint) if algorithm == "ppo" else {}
+            found = _tested(outcomes, GAUSSIAN, USUAL, endpoint) if algorithm == "ppo" else {}
             for robot in ROBOTS:
                 pair = (
                     _quiet(outcomes, algorithm, "gaussian", robot),
@@ -191,6 +192,32 @@ def quiet_starts(outcomes: Outcomes) -> list[Evidence]:
                 first = _minus(*pair, endpoint)
                 rows.append(found.get(robot) or first)
     return [row for row in rows if row is not None]
+
+
+def exploratory(outcomes: Outcomes, gaussian: Column, endpoint: str) -> list[Evidence]:
+    """Return each bounded law under PPO, with its equally quiet start, minus a Gaussian; no protocol tests it.
+
+    Args:
+        outcomes: of both studies, as `outcomes_of_both` returns them.
+        gaussian: a column of the second study: `GAUSSIAN`, which is as quiet, or `USUAL`.
+        endpoint: a key of `ENDPOINTS`, or "greedy", the return by the median.
+
+    Returns:
+        By law and robot, wherever both have a finished cell.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> exploratory(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))), USUAL, "final")
+        []
+    """
+    return [
+        Evidence(robot, "ppo", law, endpoint, found, study=2)
+        for law in LAWS
+        for robot in ROBOTS
+        if (found := gap(outcomes, Column("equal", "ppo", law), gaussian, robot, endpoint).difference)
+        is not None
+    ]
 
 
 def loud_pair(outcomes: Outcomes, robot: str) -> list[Outcome]:
