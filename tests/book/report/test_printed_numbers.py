@@ -240,11 +240,31 @@ def test_a_quiet_start() -> None:
         if row.endpoint == "final":
             counts.setdefault(row.algorithm, []).append(mine)
     for algorithm, found in counts.items():
-        count = counted_in(names["glued"][f"quiet-{algorithm}"])
+        count = counted_in(names["glued"][f"quiet-{algorithm}-sure"])
         near = sum(each.near for each in found)
         assert count["of"] == len(found)
         assert abs(count["above"] - sum(each.side > 0 for each in found)) <= near
         assert abs(count["below"] - sum(each.side < 0 for each in found)) <= near
+
+
+@pytest.mark.parametrize("law", ["beta", "logit-normal"])
+def test_against_what_people_run(law: str) -> None:
+    """A quiet law minus a Gaussian with a free σ that starts at 1: the counts of the answer page, and its numbers."""
+    glued = printed("which_policy")["glued"]
+    mine = {}
+    for robot in ROBOTS:
+        low = robot.lower()
+        quiet = there(*(f"{arm}-{low}-ppo-{law}" for arm in ("equal", "equal-more")))
+        mine[robot] = gap(tuple(quiet), (f"as-they-come-{low}-ppo-gaussian-free-std",), "final")
+    above, below = map(int, re.findall(r"(\d+) (?:above|below)", glued[f"{law}-usual"]))
+    near = sum(each.near for each in mine.values())
+    assert abs(above - sum(each.side > 0 for each in mine.values())) <= near
+    assert abs(below - sum(each.side < 0 for each in mine.values())) <= near
+    assert near <= 1
+    told = re.findall(r"(\w+) (\S+) \[(\S+), (\S+)\]", glued[f"{law}-usual-leads"])
+    assert len(told) == above + below
+    for robot, *numbers in told:
+        as_printed(tuple(numbers), mine[robot])
 
 
 CONTRASTS = (
