@@ -211,13 +211,14 @@ def exploratory(outcomes: Outcomes, gaussian: Column, endpoint: str) -> list[Evi
         >>> exploratory(outcomes_of_both(Outcomes.read(StudyFolder(Path("no/results")))), USUAL, "final")
         []
     """
-    return [
-        Evidence(robot, "ppo", law, endpoint, found, study=2)
-        for law in LAWS
-        for robot in ROBOTS
-        if (found := gap(outcomes, Column("equal", "ppo", law), gaussian, robot, endpoint).difference)
-        is not None
-    ]
+    rows = []
+    for law in LAWS:
+        pair = Column("equal", "ppo", law), gaussian
+        for robot in ROBOTS:
+            if (found := gap(outcomes, *pair, robot, endpoint).difference) is not None:
+                whole = all(is_whole(outcomes, column, robot) for column in pair)
+                rows.append(Evidence(robot, "ppo", law, endpoint, found, study=2, whole=whole))
+    return rows
 
 
 def loud_pair(outcomes: Outcomes, robot: str) -> list[Outcome]:
