@@ -21,10 +21,9 @@ from typing import Any
 from rich.progress import track
 
 from benchmarks.run import machine, versions
-from inbounds.book.pages.programs import assemble
+from inbounds.book.pages import programs
 from inbounds.study.running.many_cells import cores
 
-ROOT = Path(__file__).resolve().parents[1]
 TARGET = Path(__file__).parent / "results" / "pole.json"
 POLE = "InvertedPendulum-v5"
 EPOCHS, HORIZON = 40, 1000
@@ -48,7 +47,7 @@ def program(chapter: str) -> ModuleType:
         'advantages_of_actions'
     """
     module = ModuleType(chapter)
-    exec(compile(assemble(ROOT / "notebooks" / f"{chapter}.ipynb"), f"{chapter}.py", "exec"), vars(module))
+    programs.start(vars(module), chapter)
     return module
 
 
@@ -90,21 +89,22 @@ def falls_after_steps(seed: int) -> dict[str, Any]:
     torch.manual_seed(seed)
     env = gym.make(POLE)
     obs, _ = env.reset(seed=seed)
-    policy = chapter.Policy(len(obs), env.action_space, *chapter.POLICIES["logit-normal"])
+    policy = chapter.Policy(len(obs), env.action_space, chapter.normal, chapter.squash)
     critic = torch.nn.Sequential(chapter.network(len(obs), 1, gain=1.0), torch.nn.Flatten(0))
     adams = [torch.optim.Adam(net.parameters(), lr=0.01) for net in (policy.net, critic)]
-    for number in range(EPOCHS):
-        obs, batch = chapter.collect(env, obs, policy, HORIZON)
-        if not batch.terminated.any():
-            break
+    obs, batch = chapter.collect(env, obs, policy, HORIZON)
+    trained = 0
+    while batch.terminated.any():
+        if trained == EPOCHS:
+            return {"batches": None}
         chapter.update(policy, critic, adams, batch)
-    else:
-        return {"batches": None}
+        obs, batch = chapter.collect(env, obs, policy, HORIZON)
+        trained += 1
     obs, batch = chapter.collect(env, obs, policy, HORIZON)
     learned = copy.deepcopy(policy.net.state_dict())
     advantage, _ = chapter.advantages(batch, critic)
     own = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-    falls: dict[str, Any] = {"batches": number, "own": [], "shuffled": []}
+    falls: dict[str, Any] = {"batches": trained, "own": [], "shuffled": []}
     for steps in STEPS:
         for name, weight in (("own", own), ("shuffled", own[torch.randperm(HORIZON)])):
             policy.net.load_state_dict(learned)
@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> Mapping[str, Any]:
     jobs = [(lam, seed) for lam in (*LAMBDAS, None) for seed in range(chosen.seeds)]
     with ProcessPoolExecutor(chosen.workers, multiprocessing.get_context("spawn")) as pool:
         done = dict(zip(jobs, track(pool.map(work_off, jobs), "the pole", len(jobs)), strict=True))
-    found = {
+    found: dict[str, Any] = {
         "env": POLE,
         "lambda": {f"{lam:g}": [done[lam, seed] for seed in range(chosen.seeds)] for lam in LAMBDAS},
         "steps": STEPS,

@@ -1,7 +1,7 @@
 """A quiet start in other libraries: which scale makes an untrained policy execute so much noise, and no more.
 
 An untrained policy acts by its noise alone, and libraries start with σ = 1: a Gaussian that the environment clips then
-executes 0.72 of half the action range, a third of it on the bounds. The book's study starts every law with 0.4.
+executes 0.72 of half the action range, a third of it on the bounds. The book's second study compares its laws from 0.4.
 """
 
 from __future__ import annotations

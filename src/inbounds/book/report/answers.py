@@ -7,7 +7,7 @@ first_choice(of(rows, algorithm="ppo"))
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
@@ -268,10 +268,21 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
         said.append(
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
-    lent = [row for row in rows if row.as_it_comes]
-    if names := sorted({f"{row.robot}, {BOUNDED[row.law]} ({row.algorithm.upper()})" for row in lent}):
-        said.append(f"With its usual start, somewhat louder than 0.4: {'; '.join(names)}.")
-    return " ".join(said)
+    return " ".join([*said, *lent(rows)])
+
+
+def lent(rows: Iterable[Evidence]) -> list[str]:
+    """Return the sentence that names the laws which have their usual start, if there are any.
+
+    Example:
+        >>> import numpy as np
+        >>> from inbounds.study.statistics import Estimate
+        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
+        >>> lent([Evidence("Ant", "trpo", "beta", "final", ahead, study=1, as_it_comes=True)])
+        ['With its usual start, somewhat louder than 0.4: Ant, Beta (TRPO).']
+    """
+    found = {f"{row.robot}, {BOUNDED[row.law]} ({row.algorithm.upper()})" for row in rows if row.as_it_comes}
+    return [f"With its usual start, somewhat louder than 0.4: {'; '.join(sorted(found))}."] if found else []
 
 
 def _waiting(panels: Mapping[str, Sequence[Evidence]]) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from inbounds.book.report import html
-from inbounds.book.report.answers import in_brackets, of, place_of, sides, sign, too_small
+from inbounds.book.report.answers import in_brackets, lent, of, place_of, sides, sign, too_small
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.book.report.ways_to_act import BOUNDED
@@ -75,7 +75,7 @@ def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
         "Final returns: each bounded law minus an equally quiet clipped Gaussian. Each field leads to its intervals; "
         "in brackets, how well it is founded."
     )
-    return html.of_study("who wins", html.links(caption, ALGORITHMS, fields))
+    return html.of_study("who wins", html.links(" ".join([caption, *lent(here)]), ALGORITHMS, fields))
 
 
 def finding(as_they_come: str, rows: Sequence[Evidence], law: str, algorithm: str) -> str:
