@@ -75,8 +75,8 @@ def points_by_lambda(lam: float, seed: int) -> list[int]:
 def falls_after_steps(seed: int) -> dict[str, Any]:
     """Return how often the pole falls in 1000 steps after steps on one batch, its advantages in place or shuffled.
 
-    The policy learns as *Many steps from one batch* does, until a batch has no fall. Then it draws the batch on which
-    it takes the steps, without the brake and with a new Adam.
+    The policy learns as *Many steps from one batch* does, until a batch has no fall. Then it draws a fresh batch, which
+    may have one, and takes the steps on it, without the brake and with a new Adam.
 
     Returns:
         `batches` before the first without a fall (None if none was, and nothing else), and of `own` and `shuffled` the

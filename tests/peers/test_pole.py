@@ -1,9 +1,11 @@
 """Two exercises' answers that take minutes: what is stored comes out again, as far as one batch shows it."""
 
 import json
+from types import ModuleType
 from typing import Any
 
 import pytest
+import torch
 
 from benchmarks import pole
 
@@ -29,6 +31,7 @@ def test_ten_seeds_of_forty_batches_are_stored(stored: dict[str, Any]) -> None:
 def test_the_first_batch_comes_out_again(
     stored: dict[str, Any], seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Of the seed and the robot: the first batch is drawn before λ has a say."""
     monkeypatch.setattr(pole, "EPOCHS", 1)
     again = [pole.points_by_lambda(lam, seed) for lam in pole.LAMBDAS]
     assert again == [runs[seed][:1] for runs in stored["lambda"].values()]
@@ -47,7 +50,29 @@ def test_a_policy_that_never_holds_has_no_batch(monkeypatch: pytest.MonkeyPatch)
 def test_a_policy_that_holds_is_tried_on_its_own_batch_and_a_shuffled_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Where no batch is long enough for a fall, the first will do; without a step both play alike well."""
+    """In three steps the pole does not fall: the first batch will do."""
+    weights: list[torch.Tensor] = []
+    of_chapter = pole.program
+
+    def watched(chapter: str) -> ModuleType:
+        module = of_chapter(chapter)
+        surrogate = module.surrogate
+
+        def watch(policy: Any, batch: Any, weight: torch.Tensor, before: torch.Tensor) -> torch.Tensor:
+            weights.append(weight)
+            found: torch.Tensor = surrogate(policy, batch, weight, before)
+            return found
+
+        vars(module)["surrogate"] = watch
+        return module
+
+    monkeypatch.setattr(pole, "program", watched)
     monkeypatch.setattr(pole, "HORIZON", 3)
     monkeypatch.setattr(pole, "STEPS", (0, 2))
-    assert pole.falls_after_steps(0) == {"batches": 0, "own": [0, 0], "shuffled": [0, 0]}
+    falls = pole.falls_after_steps(2)
+    assert falls["batches"] == 0
+    assert len(falls["own"]) == len(falls["shuffled"]) == 2
+    own, _, shuffled, _ = weights  # two steps each
+    assert abs(float(own.mean())) < 1e-6
+    assert not torch.equal(own, shuffled)
+    assert torch.equal(own.sort().values, shuffled.sort().values)
