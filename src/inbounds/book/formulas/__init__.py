@@ -3,8 +3,8 @@
 Sphinx writes TeX and lets MathJax set it in the browser, after the text stands. `write` replaces the TeX in every page
 by what MathJax makes of it, in one run of node, and takes its script off the page. What MathJax would measure in a
 browser is left to the style sheet: a formula's em is the x-height of the text around it, over that of MathJax's font.
-Glyphs have their widths by style and stand on the base line of an empty font, of 1 KB, that a page asks for first: so
-nothing moves when the others come. The TeX stays for who copies a formula (`data-tex`, and `book.js`).
+Glyphs have their widths by style, so that nothing moves when the fonts come. The TeX stays for who copies a formula
+(`data-tex`, and `book.js`).
 
 Not MathML alone: a browser breaks no line in it, and on a phone long formulas in the text would be cut off.
 
@@ -28,7 +28,6 @@ from inbounds.book.npm import CACHE, NpmError, esbuild, made_once, node
 JS = Path(__file__).parent / "js"
 STYLES = "formulas.css"
 FONTS = "mathjax/output/chtml/fonts/woff-v2"  # below _static, where sphinx-mathjax-offline puts them
-BASE_LINE = f"{FONTS}/MathJax_Zero.woff"
 _INPUTS = ("package.json", "package-lock.json", "set.entry.js")
 _PATIENCE = 600  # seconds for all formulas; a book of 2,600 takes three
 _INLINE = re.compile(r'<span class="math notranslate nohighlight">\\\((?P<tex>.*?)\\\)</span>', re.DOTALL)
@@ -136,11 +135,8 @@ def replaced(page: str, made: dict[tuple[str, bool], str]) -> str:
     page = _SCRIPT.sub("", _SETTINGS.sub("", page))
     if static is None:
         return page
-    links = (
-        f'<link rel="preload" as="font" type="font/woff" crossorigin href="{static["static"]}{BASE_LINE}" />\n'
-        f'<link rel="stylesheet" type="text/css" href="{static["static"]}{STYLES}?v=" />\n'
-    )
-    return page.replace("</head>", f"{links}</head>", 1)
+    link = f'<link rel="stylesheet" type="text/css" href="{static["static"]}{STYLES}?v=" />'
+    return page.replace("</head>", f"{link}\n</head>", 1)
 
 
 def set_all(
