@@ -7,7 +7,7 @@ first_choice(of(rows, algorithm="ppo"))
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
@@ -271,7 +271,7 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
     return " ".join([*said, *lent(rows)])
 
 
-def lent(rows: Iterable[Evidence]) -> list[str]:
+def lent(rows: Sequence[Evidence]) -> list[str]:
     """Return the sentence that names the laws which have their usual start, if there are any.
 
     Example:
