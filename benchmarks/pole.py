@@ -143,11 +143,15 @@ def main(arguments: Sequence[str] | None = None) -> Mapping[str, Any]:
     found: dict[str, Any] = {
         "env": POLE,
         "lambda": {f"{lam:g}": [done[lam, seed] for seed in range(chosen.seeds)] for lam in LAMBDAS},
+        "first_without_a_fall": {
+            f"{lam:g}": [first_without_a_fall(done[lam, seed]) for seed in range(chosen.seeds)]
+            for lam in LAMBDAS
+        },
         "steps": STEPS,
         "batches": [done[None, seed] for seed in range(chosen.seeds)],
     }
-    for lam, runs in found["lambda"].items():
-        print(f"λ = {lam}: first batch without a fall {[first_without_a_fall(each) for each in runs]}")
+    for lam, batches in found["first_without_a_fall"].items():
+        print(f"λ = {lam}: first batch without a fall {batches}")
     for each in found["batches"]:
         print(each)
     if chosen.seeds >= parser.get_default("seeds"):

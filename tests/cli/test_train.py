@@ -64,7 +64,7 @@ def test_what_is_kept_is_told_when_nobody_can_be_told(tmp_path: Path) -> None:
         command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 3), "--checkpoint-every", "1"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
-    assert "keeps 1 epochs; the same command goes on from there" in done.stderr
+    assert "keeps 1 epoch; the same command goes on from there" in done.stderr
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])

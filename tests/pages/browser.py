@@ -38,6 +38,7 @@ STEADY = 0.05
 """More than this must not move."""
 DESKTOP = {"width": 1280, "height": 900}
 PHONE = {"width": 360, "height": 740}
+WINDOWS = {"desktop": DESKTOP, "small-window": {"width": 1100, "height": 900}, "phone": PHONE}
 
 
 def find_chromium() -> str:

@@ -74,7 +74,7 @@ def visit(request: pytest.FixtureRequest, window: Page, address: str) -> Iterato
 @pytest.fixture(scope="module", params=["desktop", "phone"])
 def width(request: pytest.FixtureRequest, visit: Visit) -> str:
     """Of the page, which is laid out anew once for all tests of a width."""
-    visit.page.set_viewport_size(book.DESKTOP if request.param == "desktop" else book.PHONE)
+    visit.page.set_viewport_size(book.WINDOWS[request.param])
     visit.page.evaluate(book.AT_REST)
     return str(request.param)
 
@@ -254,9 +254,9 @@ def test_one_search_box(visit: Visit) -> None:
         assert fields + buttons == 1
 
 
-@pytest.mark.parametrize("width", ["phone"], indirect=True)
+@pytest.mark.parametrize("width", ["small-window", "phone"], indirect=True)
 @pytest.mark.usefixtures("width")
-def test_phone_does_not_scroll_sideways(visit: Visit) -> None:
+def test_nothing_but_a_table_scrolls_sideways(visit: Visit) -> None:
     too_wide = """() => {
       const limit = document.documentElement.clientWidth;
       const scrolls = (node) => node && (getComputedStyle(node).overflowX !== 'visible' || scrolls(node.parentElement));

@@ -21,6 +21,9 @@ def test_ten_seeds_of_forty_batches_are_stored(stored: dict[str, Any]) -> None:
     assert list(stored["lambda"]) == [f"{lam:g}" for lam in pole.LAMBDAS]
     assert {len(runs) for runs in stored["lambda"].values()} == {10}
     assert {len(run) for runs in stored["lambda"].values() for run in runs} == {pole.EPOCHS}
+    assert stored["first_without_a_fall"] == {
+        lam: [pole.first_without_a_fall(run) for run in runs] for lam, runs in stored["lambda"].items()
+    }
     assert len(stored["batches"]) == 10
     assert {len(batch[name]) for batch in stored["batches"] for name in ("own", "shuffled")} == {
         len(pole.STEPS)

@@ -166,12 +166,15 @@ def test_a_film_of_one_robot_of_many_is_that_of_the_robot_alone():
     assert second.total_reward == alone.total_reward
 
 
-def test_the_reward_of_a_film_is_that_of_its_steps():
+@pytest.mark.parametrize("stride", [1, 2])
+def test_the_reward_of_a_film_is_that_of_its_steps(stride):
+    """Also of those that the last frame stands for and does not show."""
     env = made("HalfCheetah")
     action = np.full(6, 0.5, np.float32)
-    film = record(env, lambda obs: action, seconds=0.5, seed=3, width=64, height=48)
+    film = record(env, lambda obs: action, seconds=0.5, seed=3, width=64, height=48, max_fps=20 / stride)
     env.reset(seed=3)
-    assert film.total_reward == sum(float(env.step(action)[1]) for _ in range(len(film.frames)))
+    assert len(film.frames) == 10 // stride
+    assert film.total_reward == sum(float(env.step(action)[1]) for _ in range(len(film.frames) * stride))
 
 
 def test_a_film_goes_on_after_the_end_of_an_episode():

@@ -124,7 +124,7 @@ class _Session:
                 board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
             if start:
-                progress.say(f"going on with {self.run_dir}, {start} epochs done")
+                progress.say(f"going on with {self.run_dir}, {_epochs(start)} done")
             try:
                 with self.stop.listening():
                     trainer = train(
@@ -190,9 +190,9 @@ class _Session:
                 f"{quoted(self.run_dir)}. What helps: {advice}"
             )
         done = (
-            f"done: {self.done} epochs"
+            f"done: {_epochs(self.done)}"
             if self.done > start
-            else f"there was nothing to do: {start} epochs are done"
+            else f"there was nothing to do: {_epochs(start)} {'is' if start == 1 else 'are'} done"
         )
         print(f"{done}. {self.run_dir} has {CURVES_FILE}, {POLICIES_FILE} and {CHECKPOINT_FILE}")
         if robots.is_drawable(trainer.envs):
@@ -203,7 +203,9 @@ class _Session:
     def _kept(self, what: str) -> str:
         if not self.kept:
             return f"{what} before the first checkpoint: nothing is kept"
-        return f"{what}. {quoted(self.run_dir)} keeps {self.kept} epochs; the same command goes on from there"
+        return (
+            f"{what}. {quoted(self.run_dir)} keeps {_epochs(self.kept)}; the same command goes on from there"
+        )
 
     def _unwritten(self, error: OSError) -> CommandError:
         if is_disk_full(error):
@@ -240,6 +242,10 @@ def _check_environment(config: TrainConfig) -> None:
         if isinstance(error, ValueError) and not is_ours(error):
             raise  # the environment's own
         raise CommandError(f"{config.env} will not do: {str(error).rstrip('.')}. {tasks}", 2) from error
+
+
+def _epochs(count: int) -> str:
+    return f"{count} epoch{'' if count == 1 else 's'}"
 
 
 def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:

@@ -219,7 +219,7 @@ def record(
     obs, _ = env.reset(seed=seed)
     frames, total_reward = [], 0.0
     with RobotRenderer(env, index=index, width=width, height=height, camera=camera) as renderer:
-        for step in range((num_frames - 1) * stride + 1):
+        for step in range(num_frames * stride):
             if step % stride == 0:
                 frames.append(renderer.frame())
             obs, reward, terminated, truncated, _ = env.step(policy(obs))
