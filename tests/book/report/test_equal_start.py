@@ -43,15 +43,15 @@ def test_grades_of_the_first_study(changed: dict, word: str) -> None:
 @pytest.mark.parametrize(
     ("changed", "word"),
     [
-        ({}, "found with fresh seeds"),
+        ({}, "found"),
         ({"whole": False}, "suggested"),
         ({"p_adjusted": 0.2}, "suggested"),
-        ({"difference": gap(-900, -300)}, "found with fresh seeds"),
-        ({"difference": gap(10, 90)}, "too small to matter, with fresh seeds"),
-        ({"difference": gap(-90, 90)}, "too small to matter, with fresh seeds"),
+        ({"difference": gap(-900, -300)}, "found"),
+        ({"difference": gap(10, 90)}, "too small to matter"),
+        ({"difference": gap(-90, 90)}, "too small to matter"),
         ({"difference": gap(-90, 90), "whole": False}, "no difference found"),
-        ({"difference": gap(10, 90), "primary": False}, "found with fresh seeds"),
-        ({"difference": gap(-90, 900)}, "found with fresh seeds"),  # the protocol's test decides
+        ({"difference": gap(10, 90), "primary": False}, "found"),
+        ({"difference": gap(-90, 900)}, "found"),  # the protocol's test decides
         ({"difference": gap(-90, 900), "p_adjusted": 0.2}, "no difference found"),
     ],
 )
@@ -62,12 +62,12 @@ def test_grades_of_the_second_study(changed: dict, word: str) -> None:
 def test_what_is_too_small_to_matter_is_not_called_no_difference() -> None:
     small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
     assert answers.counted([SECOND_ONE, small]) == (
-        "above on 1 of 2 robots (found with fresh seeds), below on 0, too small to matter on 1"
+        "above on 1 of 2 robots (found), below on 0, too small to matter on 1"
     )
     assert answers.counted([small]).endswith("too small to matter on 1")
-    assert winners.field([small]) == "too small to matter, with fresh seeds; logit-normal not run"
+    assert winners.field([small]) == "too small to matter; logit-normal not run"
     weak = dataclasses.replace(SECOND_ONE, whole=False)
-    assert answers.in_brackets([weak, SECOND_ONE, small]) == " (found with fresh seeds on 1, suggested on 1)"
+    assert answers.in_brackets([weak, SECOND_ONE, small]) == " (found on 1, suggested on 1)"
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def test_the_grade_changes_as_cells_arrive(folder: StudyFolder) -> None:
     more = ("equal-more-ant-ppo-gaussian-free-std", "equal-more-ant-ppo-beta")
     write_cells(folder, [cell for cell in SECOND["B, more seeds"] if cell.id in more])
     whole = of_the_beta(folder)
-    assert (whole.whole, whole.difference.n, grade(whole)) == (True, 20, "found with fresh seeds")
+    assert (whole.whole, whole.difference.n, grade(whole)) == (True, 20, "found")
 
 
 def test_a_quiet_start_waits_for_the_second_study(folder: StudyFolder) -> None:

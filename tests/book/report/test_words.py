@@ -12,7 +12,7 @@ from inbounds.book.report.words import WAITS, by_robot
         ({"Ant": "higher", "Hopper": "higher"}, "above on 2 of 2 robots (Ant, Hopper), below on 0"),
         (
             {"Ant": "lower", "Hopper": "not after Holm", "Swimmer": "unresolved", "Humanoid": WAITS},
-            "above on 0 of 4 robots, below on 1 (Ant), set apart by the interval alone on 1 (Hopper), "
+            "above on 0 of 4 robots, below on 1 (Ant), suggested on 1 (Hopper), "
             "no difference found on 1, seeds still to be run on 1 (Humanoid)",
         ),
     ],

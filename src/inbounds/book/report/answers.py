@@ -30,7 +30,7 @@ def sign(row: Evidence) -> int:
 
 def too_small(row: Evidence) -> bool:
     """Return whether the second study's rule says that a difference, if there is one, is too small to choose by."""
-    return grade(row) == "too small to matter, with fresh seeds"
+    return grade(row) == "too small to matter"
 
 
 def first_choice(rows: Sequence[Evidence]) -> str:
@@ -154,7 +154,7 @@ def in_brackets(rows: Sequence[Evidence]) -> str:
         ' (suggested)'
     """
     counts = Counter[str](map(grade, rows))
-    known = [word for word in ("found with fresh seeds", "found", "suggested") if counts[word]]
+    known = [word for word in ("found", "suggested") if counts[word]]
     if len(known) > 1:
         known = [f"{word} on {counts[word]}" for word in known]
     return f" ({', '.join(known)})" if known else ""

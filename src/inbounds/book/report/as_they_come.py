@@ -19,7 +19,7 @@ from inbounds.book.report import html
 from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.rows import of as of
-from inbounds.book.report.words import by_robot, pair_name, title_of
+from inbounds.book.report.words import by_robot, graded, pair_name, title_of
 from inbounds.study import analysis, statistics
 from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
@@ -107,7 +107,9 @@ def told(rows: Sequence[Compared]) -> str:
         >>> told([])
         'not run yet'
     """
-    return by_robot([(f"{row.robot}{'†' if row.fragile else ''}", row.word) for row in rows])
+    return by_robot(
+        [(f"{row.robot}{'†' if row.fragile else ''}", graded(row.word, row.difference)) for row in rows]
+    )
 
 
 def comparisons(rows: Sequence[Compared], arm: str, algorithm: str) -> Shown:

@@ -28,9 +28,8 @@ from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import side
 
 Grade: TypeAlias = Literal[
-    "found with fresh seeds",
-    "too small to matter, with fresh seeds",
     "found",
+    "too small to matter",
     "suggested",
     "no difference found",
 ]
@@ -82,10 +81,9 @@ def grade(evidence: Evidence) -> Grade:
     """Return how well a difference is founded: the only place that decides it.
 
     Returns:
-        * *found with fresh seeds*: all planned seeds of the second study are there, and its corrected test finds it;
-        * *too small to matter, with fresh seeds*: by the second protocol's rule for its primary comparison, the
-          interval lies within the margin;
-        * *found*: the same test of the first study's protocol finds it;
+        * *found*: all planned seeds are there, and the corrected test that its study planned finds it;
+        * *too small to matter*: by the second protocol's rule for its primary comparison, the interval lies within
+          the margin;
         * *suggested*: the interval leaves out 0, but no corrected test finds it, or seeds are still to be run;
         * *no difference found*: the interval holds 0.
 
@@ -94,23 +92,21 @@ def grade(evidence: Evidence) -> Grade:
         >>> import numpy as np
         >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
         >>> first = Evidence("Ant", "ppo", "beta", "final", ahead, study=1, p_adjusted=0.01)
-        >>> grade(first), grade(dataclasses.replace(first, study=2)), grade(dataclasses.replace(first, whole=False))
-        ('found', 'found with fresh seeds', 'suggested')
+        >>> grade(first), grade(dataclasses.replace(first, whole=False))
+        ('found', 'suggested')
     """
     gap, apart = evidence.difference, clear(evidence.difference)
     tested = evidence.whole and evidence.p_adjusted < SIGNIFICANCE  # NaN is not below
     if evidence.primary and evidence.whole:
         told = finding(gap, evidence.p_adjusted, evidence.margin)
         if told == "refuted":
-            return "too small to matter, with fresh seeds"
+            return "too small to matter"
         if told in ("confirmed", "contradicted"):
-            return "found with fresh seeds"
+            return "found"
         tested = False
     if not apart:
         return "no difference found"
-    if not tested:
-        return "suggested"
-    return "found with fresh seeds" if evidence.study == 2 else "found"
+    return "found" if tested else "suggested"
 
 
 def clear(estimate: Estimate) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import with_second
 from inbounds.book.report.html import NONE_FINISHED, Shown
-from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name
+from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name, graded
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.second import SecondaryRow, secondary
 from inbounds.study.statistics import Comparison, Estimate
@@ -62,7 +62,7 @@ def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "fi
         endpoint: final or area.
     """
     rows = _asked(outcomes, [(question, family)], endpoint)
-    return by_robot([(row.robot, _verdict(row.comparison)) for row in rows])
+    return by_robot([(row.robot, _graded(row.comparison)) for row in rows])
 
 
 def difference(
@@ -104,6 +104,11 @@ def _asked(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str) 
         if (row.question, row.pair.first.family, row.endpoint) in wanted
         and row.comparison.difference is not None
     ]
+
+
+def _graded(comparison: Comparison) -> str:
+    assert comparison.difference is not None  # `_asked` leaves such rows out
+    return graded(_verdict(comparison), comparison.difference)
 
 
 def _verdict(comparison: Comparison) -> str:

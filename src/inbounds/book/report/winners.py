@@ -43,7 +43,7 @@ def field(rows: Sequence[Evidence]) -> str:
     for word, way in (("above", 1), ("below", -1)):
         found = [row for row in rows if signs[row.law] == way]
         told += [f"{BOUNDED[row.law]} {word} ({grade(row)})" for row in found]
-    for word in ("too small to matter, with fresh seeds", "no difference found"):
+    for word in ("too small to matter", "no difference found"):
         alike = [BOUNDED[row.law] for row in rows if grade(row) == word]
         if alike:
             told.append(word if len(alike) == len(rows) else f"{' and '.join(alike)}: {word}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from inbounds.book.drawing.figures import LOOKS
+from inbounds.book.report.equal_start import clear
 from inbounds.book.report.study_figures import SHORT
 from inbounds.study.analysis import Contrast
 from inbounds.study.grid import FREE
@@ -75,6 +76,22 @@ def change_name(variant: str) -> str:
     return CHANGES.get(variant, f"{LETTERS.get(word, word)} {value}".strip())
 
 
+def graded(verdict: str, difference: Estimate) -> str:
+    """Return a verdict as the pages' grades have it: near 0, an interval by itself suggests nothing.
+
+    Args:
+        verdict: what `inbounds.study.words.verdict` says.
+        difference: of what.
+
+    Example:
+        >>> import numpy as np
+        >>> near, far = (Estimate(np.array(9.0), np.array(e), np.array(20.0), 10, 0, 0.95, "") for e in (0.1, 1.0))
+        >>> graded("not after Holm", near), graded("not after Holm", far), graded("higher", near)
+        ('unresolved', 'not after Holm', 'higher')
+    """
+    return "unresolved" if verdict == "not after Holm" and not clear(difference) else verdict
+
+
 WAITS = "waits for seeds"
 """The verdict on a difference that a protocol tests when more seeds have run."""
 
@@ -83,11 +100,11 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
     """Return on which robots a difference is found above 0, on which below, and on how many it is not.
 
     Args:
-        verdicts: robot, and what `inbounds.study.words.verdict` says there.
+        verdicts: robot, and what `graded` says there.
 
     Example:
         >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm")])
-        'above on 1 of 2 robots (Ant), below on 0, set apart by the interval alone on 1 (Hopper)'
+        'above on 1 of 2 robots (Ant), below on 0, suggested on 1 (Hopper)'
         >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
         'above on 0 of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
         >>> by_robot([])
@@ -105,7 +122,7 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
 
     parts = [told("above", "higher", f" of {robots(len(verdicts))}"), told("below", "lower")]
     if "not after Holm" in where:
-        parts.append(told("set apart by the interval alone", "not after Holm"))
+        parts.append(told("suggested", "not after Holm"))
     if "unresolved" in where:
         parts.append(f"no difference found on {len(where['unresolved'])}")
     if WAITS in where:
