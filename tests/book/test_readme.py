@@ -47,12 +47,17 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert {grade(row) for row in above} == {"found"}
     assert sorted(grade(row) for row in below) == ["found", "suggested"]
     assert len(above) == 2
-    assert f"with fresh seeds, it takes a Gaussian higher on 2 of {len(ppo)} robots (found)" in said
+    assert (
+        f"With fresh seeds, under PPO, it takes a Gaussian higher on 2 of {len(ppo)} robots (found)" in said
+    )
     assert "and lower on 2 (one found, one suggested)" in said
     (cheetah,), (swimmer,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Swimmer"))
-    assert f"the change is {spoken(cheetah.difference, 0)} points on HalfCheetah" in said
+    assert f": by {spoken(cheetah.difference, 0)} points on HalfCheetah" in said
     assert f"{spoken(swimmer.difference)} on Swimmer, where a fifth of what training adds is 24." in said
     assert swimmer.difference.value < -swimmer.margin  # which is a fifth
+    trpo = answers.of(final, algorithm="trpo")
+    assert [grade(row) for row in trpo if answers.sign(row) > 0] == ["suggested"] * 2
+    assert f"Under TRPO: higher on 2 of {len(trpo)} (suggested)." in said
     assert swimmer.margin == 24
 
 
@@ -97,9 +102,10 @@ def test_the_median() -> None:
     )
     said = bullet("Act by the median")
     assert not noise.above + fresh_noise.above
-    assert f"earns less in {noise.below} of {noise.cells} cells, more in none" in said
+    of_noise = f"earns less with its noise in {noise.below} of {noise.cells} cells, more in none"
+    assert f"Than by it, a Beta or logit-normal {of_noise}" in said
     assert f"by its mode less in {mode.below}, more in {mode.above}." in said
-    counts = f"{fresh_noise.below} and none; {fresh_mode.below} and {fresh_mode.above}."
+    counts = f"noise {fresh_noise.below} and none, mode {fresh_mode.below} and {fresh_mode.above}."
     assert f"With fresh seeds, of {fresh_mode.cells} cells: {counts} (Not corrected.)" in said
 
 
