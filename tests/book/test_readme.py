@@ -63,7 +63,7 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
 
 def test_a_law(outcomes: Outcomes) -> None:
     rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
-    assert answers.advice(rows, "ppo") == "Under PPO no law leads: keep your library's."
+    assert answers.advice(rows, "ppo") == "Under PPO no law leads: keep your library's law."
     said = bullet("Then, under PPO, no law leads.")
     graded = {
         (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)

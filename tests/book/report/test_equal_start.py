@@ -143,7 +143,7 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     rows = [row(law, 100, 900, robot) for law in ("beta", "logit-normal") for robot in ROBOTS]
     rows = [row("logit-normal", -900, -100), *rows]
     assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
-    assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's."
+    assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's law."
     assert "no law leads:" in answers.advice([*rows, row("beta", -900, -100)], "ppo")
 
 

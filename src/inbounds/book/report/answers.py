@@ -65,14 +65,14 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
 
     Example:
         >>> advice([], "trpo")
-        "Under TRPO too few robots have run: keep your library's."
+        "Under TRPO too few robots have run: keep your library's law."
     """
     here = of(rows, algorithm=algorithm)
     if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
-        told = " too few robots have run: keep your library's"
+        told = " too few robots have run: keep your library's law"
     else:
         told = {
-            "": " no law leads: keep your library's",
+            "": " no law leads: keep your library's law",
             "beta": ", try the Beta",
             "logit-normal": ", try the logit-normal",
         }[first_choice(here)]
