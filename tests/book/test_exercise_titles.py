@@ -57,7 +57,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     (folder / "index.md").write_text(INDEX, encoding="utf8")
     (folder / "other.md").write_text(OTHER, encoding="utf8")
     settings = {
-        "extensions": ["myst_parser", "sphinx_exercise", "exercise_titles"],
+        "extensions": ["myst_nb", "sphinx_exercise", "exercise_titles"],
+        "nb_execution_mode": "off",
         "myst_enable_extensions": ["dollarmath"],
         "numfig": True,
     }
