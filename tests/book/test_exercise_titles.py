@@ -1,15 +1,11 @@
 """The titles of exercises and solutions, in a small book of two pages."""
 
-import io
 import re
-import sys
-from pathlib import Path
 
 import pytest
-from sphinx.application import Sphinx
-from sphinx.util.docutils import docutils_namespace, patch_docutils
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.book import small_book
+
 INDEX = """# A page
 
 ```{toctree}
@@ -58,21 +54,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     (folder / "other.md").write_text(OTHER, encoding="utf8")
     settings = {
         "extensions": ["myst_nb", "sphinx_exercise", "exercise_titles"],
-        "nb_execution_mode": "off",
         "myst_enable_extensions": ["dollarmath"],
         "numfig": True,
     }
-    sys.path.insert(0, str(ROOT / "book" / "_ext"))
-    said = io.StringIO()
-    try:
-        with patch_docutils(), docutils_namespace():
-            app = Sphinx(
-                folder, None, folder / "html", folder / "trees", "html", settings, None, said, freshenv=True
-            )
-            app.build()
-    finally:
-        sys.path.pop(0)
-    assert said.getvalue() == ""
+    assert small_book.build(folder, settings) == ""
     index, other = (
         (folder / "html" / f"{name}.html").read_text(encoding="utf8") for name in ("index", "other")
     )

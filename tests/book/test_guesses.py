@@ -1,6 +1,5 @@
 """The questions of a Predict box become forms whose key comes from the answer; what does not add up stops the build."""
 
-import io
 import re
 import sys
 from collections.abc import Callable
@@ -9,13 +8,11 @@ from pathlib import Path
 import nbformat
 import pytest
 from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.util.docutils import docutils_namespace, patch_docutils
 
+from tests.book import small_book
 from tests.book.anatomy import REWRITTEN, block, prose_of
 
 ROOT = Path(__file__).resolve().parents[2]
-EXTENSIONS = ROOT / "book" / "_ext"
 
 CHOICE = """```{guess}
 Is $x$ **more** or less?
@@ -69,31 +66,13 @@ def built(folder: Path, box: str, share: str = "0.553", kind: str = "predict") -
         cells=[page, cell], metadata={"language_info": {"name": "python", "pygments_lexer": "ipython3"}}
     )
     nbformat.write(notebook, folder / "index.ipynb")
-    said = io.StringIO()
     settings = {
         "extensions": ["myst_nb", "sphinx_design", "guesses"],
-        "nb_execution_mode": "off",
         "myst_enable_extensions": ["dollarmath", "tasklist"],
         "html_static_path": [str(ROOT / "book" / "_static")],
     }
-    sys.path.insert(0, str(EXTENSIONS))
-    try:
-        with patch_docutils(), docutils_namespace():
-            app = Sphinx(
-                folder,
-                None,
-                folder / "html",
-                folder / "trees",
-                "html",
-                confoverrides=settings,
-                status=None,
-                warning=said,
-                freshenv=True,
-            )
-            app.build()
-    finally:
-        sys.path.remove(str(EXTENSIONS))
-    return (folder / "html" / "index.html").read_text(encoding="utf8"), said.getvalue()
+    said = small_book.build(folder, settings)
+    return (folder / "html" / "index.html").read_text(encoding="utf8"), said
 
 
 @pytest.fixture(scope="module")
@@ -226,11 +205,11 @@ def test_a_guess_outside_a_box_is_an_error(tmp_path: Path) -> None:
     ],
 )
 def test_numbers_are_shown_with_three_digits(number: float, text: str) -> None:
-    sys.path.insert(0, str(EXTENSIONS))
+    sys.path.insert(0, str(small_book.EXTENSIONS))
     try:
         import guesses
     finally:
-        sys.path.remove(str(EXTENSIONS))
+        sys.path.remove(str(small_book.EXTENSIONS))
     assert guesses.shown(number) == text
     assert isinstance(guesses.element("p"), nodes.Element)
 

@@ -52,12 +52,12 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     )
     assert "and lower on 2 (one found, one suggested)" in said
     (cheetah,), (swimmer,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Swimmer"))
-    assert f": by {spoken(cheetah.difference, 0)} points on HalfCheetah" in said
+    assert f"the change is {spoken(cheetah.difference, 0)} points on HalfCheetah" in said
     assert f"{spoken(swimmer.difference)} on Swimmer, where a fifth of what training adds is 24." in said
     assert swimmer.difference.value < -swimmer.margin  # which is a fifth
     trpo = answers.of(final, algorithm="trpo")
     assert [grade(row) for row in trpo if answers.sign(row) > 0] == ["suggested"] * 2
-    assert f"Under TRPO: higher on 2 of {len(trpo)} (suggested)." in said
+    assert f"Under TRPO, asked afterwards: higher on 2 of {len(trpo)} (suggested)." in said
     assert swimmer.margin == 24
 
 
@@ -102,8 +102,10 @@ def test_the_median() -> None:
     )
     said = bullet("Act by the median")
     assert not noise.above + fresh_noise.above
-    of_noise = f"earns less with its noise in {noise.below} of {noise.cells} cells, more in none"
-    assert f"Than by it, a Beta or logit-normal {of_noise}" in said
+    of_noise = (
+        f"earns less with its noise than by its median in {noise.below} of {noise.cells} cells, more in none"
+    )
+    assert f"A Beta or logit-normal {of_noise}" in said
     assert f"by its mode less in {mode.below}, more in {mode.above}." in said
     counts = f"noise {fresh_noise.below} and none, mode {fresh_mode.below} and {fresh_mode.above}."
     assert f"With fresh seeds, of {fresh_mode.cells} cells: {counts} (Not corrected.)" in said

@@ -81,9 +81,9 @@ def grade(evidence: Evidence) -> Grade:
     """Return how well a difference is founded: the only place that decides it.
 
     Returns:
+        * *too small to matter*, before the others: by the second protocol's rule for its primary comparison, all
+          planned seeds are there and the interval lies within the margin;
         * *found*: all planned seeds are there, and the corrected test that its study planned finds it;
-        * *too small to matter*: by the second protocol's rule for its primary comparison, the interval lies within
-          the margin;
         * *suggested*: the interval leaves out 0, but no corrected test finds it, or seeds are still to be run;
         * *no difference found*: the interval holds 0.
 
