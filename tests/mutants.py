@@ -1030,7 +1030,7 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "what a test does not find is counted as nothing",
         "book/report/words.py",
-        'parts.append(told("suggested", "not after Holm"))',
+        'parts += [told(side, side) for side in ("suggested above", "suggested below") if side in where]',
         "pass",
         "tests/book/report/test_words.py::test_each_robot_is_counted_once",
     ),

@@ -77,7 +77,7 @@ def change_name(variant: str) -> str:
 
 
 def graded(verdict: str, difference: Estimate) -> str:
-    """Return a verdict as the pages' grades have it: near 0, an interval by itself suggests nothing.
+    """Return a verdict as the pages' grades have it: an interval by itself suggests a side, or near 0 nothing.
 
     Args:
         verdict: what `inbounds.study.words.verdict` says.
@@ -87,9 +87,13 @@ def graded(verdict: str, difference: Estimate) -> str:
         >>> import numpy as np
         >>> near, far = (Estimate(np.array(9.0), np.array(e), np.array(20.0), 10, 0, 0.95, "") for e in (0.1, 1.0))
         >>> graded("not after Holm", near), graded("not after Holm", far), graded("higher", near)
-        ('unresolved', 'not after Holm', 'higher')
+        ('unresolved', 'suggested above', 'higher')
     """
-    return "unresolved" if verdict == "not after Holm" and not clear(difference) else verdict
+    if verdict != "not after Holm":
+        return verdict
+    if not clear(difference):
+        return "unresolved"
+    return "suggested above" if difference.value > 0 else "suggested below"
 
 
 WAITS = "waits for seeds"
@@ -97,14 +101,14 @@ WAITS = "waits for seeds"
 
 
 def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
-    """Return on which robots a difference is found above 0, on which below, and on how many it is not.
+    """Return on which robots a difference is found above 0 or below, or suggested, and on how many it is not.
 
     Args:
         verdicts: robot, and what `graded` says there.
 
     Example:
-        >>> by_robot([("Ant", "higher"), ("Hopper", "not after Holm")])
-        'above on 1 of 2 robots (Ant), below on 0, suggested on 1 (Hopper)'
+        >>> by_robot([("Ant", "higher"), ("Hopper", "suggested below")])
+        'above on 1 of 2 robots (Ant), below on 0, suggested below on 1 (Hopper)'
         >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
         'above on 0 of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
         >>> by_robot([])
@@ -121,8 +125,7 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
         return f"{name} on {len(found)}{size}" + (f" ({', '.join(found)})" if found else "")
 
     parts = [told("above", "higher", f" of {robots(len(verdicts))}"), told("below", "lower")]
-    if "not after Holm" in where:
-        parts.append(told("suggested", "not after Holm"))
+    parts += [told(side, side) for side in ("suggested above", "suggested below") if side in where]
     if "unresolved" in where:
         parts.append(f"no difference found on {len(where['unresolved'])}")
     if WAITS in where:
