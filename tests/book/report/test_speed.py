@@ -78,12 +78,15 @@ def on_page(monkeypatch: pytest.MonkeyPatch) -> list[tuple[dict, dict]]:
 def test_what_was_not_measured_is_called_missing(tmp_path: Path, on_page: list) -> None:
     assert speed.read_speed(tmp_path) is None
     assert speed.read_validation(tmp_path) is None
+    assert speed.read_anchor(tmp_path) is None
     assert "<code>make bench</code>" in speed.ratio_table(None)._repr_html_()
     assert "benchmarks.validate" in speed.verdict_table(None)._repr_html_()
+    assert "benchmarks.anchor" in speed.anchor_table(None)._repr_html_()
     assert "Missing" in speed.how_measured(None)._repr_html_()
     speed.show_speed(None)
     speed.show_validation(None)
-    assert len(on_page) == 2
+    speed.show_anchor(None)
+    assert len(on_page) == 3
     assert all("Missing" in data["text/html"] for data, _ in on_page)
 
 
@@ -176,6 +179,47 @@ def test_the_curves_of_both_sides_are_drawn(tmp_path: Path, on_page: list) -> No
     speed.show_validation({**found, "verdicts": verdicts})
     ((_, metadata),) = on_page
     assert "stable-baselines3" in metadata["image/png"]["alt"]
+
+
+def anchor(folder: Path) -> Any:
+    """An anchor's results with each of its words, as `benchmarks.anchor` writes them."""
+    sides = {"inbounds": {"mean": 1234.4, "std": 56.0}, "stable-baselines3": {"mean": -12.0, "std": 7.6}}
+    numbers = {
+        "margin": 1170.0,
+        "difference": -1246.4,
+        "interval_90": [-1300.0, 2.4],
+        "p_value": 0.0123,
+        "seeds_needed": 31,
+    }
+    validation(folder)
+    verdicts = {
+        "Ant-v5": sides | numbers | {"word": "different"},
+        "Hopper-v5": sides | numbers | {"word": "undecided"},
+        "Walker2d-v5": sides | {"margin": 170.0, "word": "undecided", "reason": "no return"},
+    }
+    found = {"seeds": {"Ant-v5": 10, "Hopper-v5": 3}, "env_steps": 8192, "verdicts": verdicts}
+    (folder / "anchor.json").write_text(json.dumps(found))
+    return speed.read_anchor(folder)
+
+
+def test_the_anchor_says_its_word_and_its_numbers(tmp_path: Path) -> None:
+    shown = speed.anchor_table(anchor(tmp_path))
+    assert repr(shown) == repr(speed.anchor_table(None))
+    ant, hopper, walker = rows(shown.html)
+    same = ["1234 ± 56.0", "−12.0 ± 7.6"]
+    numbers = ["−1246 (−1300 to 2.4)", "± 1170", "0.012"]
+    assert ant == ["Ant-v5", *same, *numbers, "different"]
+    assert hopper[:-1] == ["Hopper-v5", *same, *numbers]
+    assert hopper[-1].startswith("undecided; with equal means 31 seeds a side")
+    assert walker == ["Walker2d-v5", *same, "–", "± 170", "–", "undecided: no return"]
+    assert "(10 on Ant-v5, 3 on Hopper-v5), 8,192 env steps each" in shown.html
+
+
+def test_the_curves_of_the_anchor_are_drawn(tmp_path: Path, on_page: list) -> None:
+    found = anchor(tmp_path)
+    speed.show_anchor({**found, "verdicts": {"Hopper-v5": found["verdicts"]["Hopper-v5"]}})
+    ((_, metadata),) = on_page
+    assert metadata["image/png"]["alt"].startswith("Over a million steps: return in training")
 
 
 def test_without_the_source_tree_the_error_says_what_to_do(

@@ -1,8 +1,8 @@
-"""What the benchmark and the validation found, as the book shows it; what was not measured is called missing.
+"""What benchmark, validation and anchor found, as the book shows it; what was not measured is called missing.
 
-`make bench` writes `speed.json`, `python -m benchmarks.validate` writes `validation.json` and `curves.parquet`, both
-below `benchmarks/results`. Ratios, medians and plots are those of `benchmarks.report` and `benchmarks.validate`; here
-they become a page's tables. The benchmark is part of the source tree and not of the installed package::
+`make bench` writes `speed.json`; `python -m benchmarks.validate` and `python -m benchmarks.anchor` write their verdicts
+and `curves.parquet`, all below `benchmarks/results`. Ratios, medians and plots are those of `benchmarks`; here they
+become a page's tables. The benchmark is part of the source tree and not of the installed package::
 
     results = speed.read_speed()  # None: nobody has measured yet
     speed.ratio_table(results)
@@ -26,7 +26,7 @@ import numpy as np
 
 from inbounds.book.drawing import alt_text
 from inbounds.book.report.html import Shown, bullets, missing, table
-from inbounds.study.words import percent
+from inbounds.study.words import number, p_value, percent
 
 ROOT = Path(__file__).resolve().parents[4]  # src/inbounds/book/report/speed.py
 RESULTS = ROOT / "benchmarks" / "results"
@@ -58,6 +58,10 @@ NO_VALIDATION = (
     "Not measured in this copy of the book. `python -m benchmarks.validate` trains both sides (about 45 minutes on two "
     "cores) and writes `benchmarks/results/validation`; then build the book again."
 )
+NO_ANCHOR = (
+    "Not measured in this copy of the book. `python -m benchmarks.anchor` trains both sides (many hours) and writes "
+    "`benchmarks/results/anchor`; then build the book again."
+)
 AS_ABOVE = "Missing, like the table."
 SPEED_ALT = (
     "Environment steps per second on one core on a logarithmic axis, a panel per robot and a row per contestant: "
@@ -67,6 +71,7 @@ VALIDATION_ALT = (
     "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, "
     "a solid line, and of stable-baselines3, a dashed line."
 )
+ANCHOR_ALT = f"Over a million steps: {VALIDATION_ALT[0].lower()}{VALIDATION_ALT[1:]}"
 
 
 def read_speed(folder: Path = RESULTS) -> Results | None:
@@ -76,12 +81,12 @@ def read_speed(folder: Path = RESULTS) -> Results | None:
 
 def read_validation(folder: Path = RESULTS / "validation") -> Results | None:
     """Return the validation's verdicts, or None; the curves' table is added as `curves`."""
-    found, path = _read(folder / "validation.json"), folder / "curves.parquet"
-    if found is None or not path.is_file():
-        return None
-    import pyarrow.parquet as pq
+    return _with_curves(folder / "validation.json")
 
-    return {**found, "curves": pq.read_table(path)}
+
+def read_anchor(folder: Path = RESULTS / "anchor") -> Results | None:
+    """Return the verdicts of the second study's anchor, or None; the curves' table is added as `curves`."""
+    return _with_curves(folder / "anchor.json")
 
 
 def ratio_table(results: Results | None) -> Shown:
@@ -206,10 +211,59 @@ def show_validation(validation: Results | None) -> None:
     Args:
         validation: from `read_validation`.
     """
-    if validation is None:
-        return _show_missing(VALIDATION_ALT)
-    fig, _ = _benchmarks("validate").plot(validation["curves"], validation["verdicts"])
-    return alt_text.show(fig, VALIDATION_ALT)
+    _show_curves(validation, VALIDATION_ALT)
+
+
+def anchor_table(anchor: Results | None) -> Shown:
+    """Return the verdicts on the anchor's two sides, a row per robot.
+
+    Args:
+        anchor: from `read_anchor`.
+
+    Example:
+        >>> anchor_table(None)
+        <anchor: verdicts>
+    """
+    what = "anchor: verdicts"
+    if anchor is None:
+        return _missing(what, NO_ANCHOR)
+    who = _benchmarks("validate")
+    head = ["Robot", "In Bounds", who.PEER, "difference (90 % interval)", "margin", "p", "verdict"]
+    rows = [[env, *_compared(found, who)] for env, found in anchor["verdicts"].items()]
+    seeds = ", ".join(f"{count} on {env}" for env, count in anchor["seeds"].items())
+    caption = (
+        "Mean area under the learning curve, less where the curves start, ± standard deviation over seeds a side "
+        f"({seeds}), {anchor['env_steps']:,} env steps each."
+    )
+    return Shown(what, [table(caption, head, rows, words=(0, 6))])
+
+
+def show_anchor(anchor: Results | None) -> None:
+    """Put the learning curves of the anchor's sides on the page, or the word that they are missing.
+
+    Args:
+        anchor: from `read_anchor`.
+    """
+    _show_curves(anchor, ANCHOR_ALT)
+
+
+def _show_curves(results: Results | None, alt: str) -> None:
+    if results is None:
+        return _show_missing(alt)
+    fig, _ = _benchmarks("validate").plot(results["curves"], results["verdicts"])
+    return alt_text.show(fig, alt)
+
+
+def _compared(found: Results, who: ModuleType) -> Sequence[str]:
+    means = [f"{number(found[side]['mean'])} ± {number(found[side]['std'])}" for side in (who.OURS, who.PEER)]
+    margin = f"± {number(found['margin'])}"
+    if "reason" in found:
+        return [*means, "–", margin, "–", f"undecided: {found['reason']}"]
+    word, (low, high) = found["word"], found["interval_90"]
+    if word == "undecided":
+        word += f"; with equal means {found['seeds_needed']} seeds a side would show them equivalent in 8 of 10 cases"
+    difference = f"{number(found['difference'])} ({number(low)} to {number(high)})"
+    return [*means, difference, margin, p_value(found["p_value"]), word]
 
 
 def _verdict(found: Results, who: ModuleType) -> Sequence[str]:
@@ -230,6 +284,15 @@ def _read(path: Path) -> Results | None:
         return None
     found: Results = json.loads(path.read_text(encoding="utf8"))
     return found
+
+
+def _with_curves(verdicts: Path) -> Results | None:
+    found, path = _read(verdicts), verdicts.with_name("curves.parquet")
+    if found is None or not path.is_file():
+        return None
+    import pyarrow.parquet as pq
+
+    return {**found, "curves": pq.read_table(path)}
 
 
 def _missing(what: str, why: str) -> Shown:
