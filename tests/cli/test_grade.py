@@ -83,8 +83,9 @@ def test_every_mark_is_that_of_its_own_exercise(tmp_path: Path) -> None:
 
 def test_files_that_are_no_such_notebook(tmp_path: Path) -> None:
     text = tmp_path / "a.ipynb"
-    text.write_text("{", encoding="utf8")
-    assert graded(text) == [("–", "not reached", "this file is no notebook: ask for it again")]
+    for written in ("{", "[" * 100_000):
+        text.write_text(written, encoding="utf8")
+        assert graded(text) == [("–", "not reached", "this file is no notebook: ask for it again")]
     other = notebook(tmp_path / "b.ipynb", "1 + 1")
     assert "calls no grader" in graded(other)[0][2]
 

@@ -12,6 +12,9 @@ from inbounds.learning.storage.run_store import load_checkpoint
 from tests.cli.small import SMALL
 
 MODULE = '''
+import os
+import sys
+
 import gymnasium
 import numpy as np
 from gymnasium.envs.mujoco.hopper_v5 import HopperEnv
@@ -32,12 +35,19 @@ class Target(gymnasium.Env):
         super().reset(seed=seed)
         if self.fault == "reset":
             raise ValueError("the arm is not homed")
+        if self.fault == "away":
+            os.makedirs("away", exist_ok=True)
+            os.chdir("away")
         return np.zeros(1, np.float32), {}
 
     def step(self, action):
         self.steps += 1
         if self.fault == "step":
             raise ValueError("the arm is stuck")
+        if self.fault == "exit":
+            sys.exit(0 if self.steps == 1 else "no licence")
+        if self.fault == "late" and self.steps == 300:  # in the third epoch
+            sys.exit("no licence")
         if self.fault == "file":
             open("no/such/calibration")
         if self.fault == "pipe":
@@ -46,7 +56,7 @@ class Target(gymnasium.Env):
         return np.full(1, np.nan if broken else 0.0, np.float32), -abs(float(action[0])), False, False, {}
 
 
-for fault in ("", "reset", "step", "file", "pipe", "nan"):
+for fault in ("", "reset", "away", "step", "exit", "late", "file", "pipe", "nan"):
     gymnasium.register(f"Target{fault}-v0", Target, kwargs={"fault": fault}, max_episode_steps=50)
 gymnasium.register("OwnHopper-v0", HopperEnv, max_episode_steps=50)
 '''
@@ -114,6 +124,28 @@ def test_what_an_environment_raises_is_told_with_its_place(fault: str, said: str
     assert done.returncode == 1
     assert said in done.stderr
     assert 'my_arm.py", line' in done.stderr
+
+
+@pytest.mark.slow
+def test_a_run_stays_where_it_was_asked_for(folder: Path) -> None:
+    """Whatever directory the environment goes to, at its resets even."""
+    done = train("Targetaway-v0", folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "my run has curves.parquet" in done.stdout
+    assert len(load_checkpoint(folder / "my run")["records"]) == 2
+    assert not list((folder / "away").rglob("checkpoint.pt"))
+
+
+@pytest.mark.slow
+def test_an_environment_that_ends_the_process_is_told_from_a_call_for_help(folder: Path) -> None:
+    done = train("Targetexit-v0", folder)
+    assert done.returncode == 1
+    assert done.stderr == "inbounds: the environment ended the process: sys.exit(0)\n"
+    assert "examples" not in done.stdout
+    late = train("Targetlate-v0", folder, "--epochs", "4")
+    assert late.returncode == 1
+    assert late.stderr == "inbounds: the environment ended the process: sys.exit('no licence')\n"
+    assert "stopped by an error. 'my run' keeps 2 epochs" in late.stdout
 
 
 @pytest.mark.parametrize("env", [":", ":Env-v0", "my_arm:", "my_arm::Env-v0"])

@@ -58,12 +58,14 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path: Path) -> None:
     assert "\r" not in out
 
 
-def test_what_is_kept_is_told_when_nobody_can_be_told(tmp_path: Path) -> None:
-    """A full disk below the output is none below the run."""
+@pytest.mark.parametrize("every", ["1", "100"])
+def test_what_is_kept_is_told_when_nobody_can_be_told(every: str, tmp_path: Path) -> None:
+    """A full disk below the output is none below the run, which keeps what it has in any case."""
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 3), "--checkpoint-every", "1"]
+        command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 3), "--checkpoint-every", every]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
+    assert "stopped, because the output's disk is full" in done.stderr
     assert "keeps 1 epoch; the same command goes on from there" in done.stderr
 
 
@@ -332,6 +334,15 @@ def test_a_damaged_checkpoint_is_named_and_nothing_is_lost(harm: str, tmp_path: 
     assert f"{path} is damaged, cut short or of another origin" in err
     assert f"move {path.parent} out of the way and train again" in err
     assert contents(tmp_path / "run") == before
+
+
+def test_a_folder_in_the_checkpoint_s_place_is_told(tmp_path: Path) -> None:
+    (tmp_path / "run" / "checkpoint.pt").mkdir(parents=True)
+    code, _, err = run(*small(tmp_path / "run"))
+    assert code == 1
+    assert err == (
+        f"inbounds: {tmp_path / 'run' / 'checkpoint.pt'} is no file: choose another --out, or move it out of the way\n"
+    )
 
 
 @pytest.mark.parametrize("harm", ["cut short", "empty", "flipped", "text"])

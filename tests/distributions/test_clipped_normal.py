@@ -96,6 +96,15 @@ def test_the_tails_of_the_masses() -> None:
     assert float(p.cdf(*double(-1.0))) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("log_scale", [3.0, 12.0, 16.0, 18.4, 20.7, 23.0, 60.0])
+def test_the_variance_of_a_wide_normal_is_that_of_its_two_bounds(log_scale: float) -> None:
+    """The mass inside is φ(0)·2/σ at most, and what it takes away from ((high − low)/2)² less than that."""
+    p = law(0.3, log_scale)
+    inside = 2 / math.sqrt(2 * math.pi) / float(p.scale)
+    assert 1 - 1.01 * inside <= float(p.variance) <= 1
+    assert float(p.stddev) <= 1
+
+
 @few
 @given(locs, log_scales, intervals())
 def test_mean_and_variance_against_quadrature(

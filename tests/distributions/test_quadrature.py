@@ -142,9 +142,17 @@ def test_the_half_width_is_the_callers_too() -> None:
 def test_impossible_rules_are_refused(rule, arguments: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="rule needs"):
         rule(*arguments)
-    for number in ({"num_nodes": 1}, {"num_nodes": 0}, {"half_width": 0.0}):
+    for number in ({"num_nodes": 1}, {"num_nodes": 0}, {"half_width": 0.0}, {"half_width": math.inf}):
         with pytest.raises(ValueError, match="trapezoid rule needs"):
             graded_trapezoid(*double(0.0, 1.0), **number)
+
+
+def test_a_rule_of_whole_numbers_is_refused() -> None:
+    for rule in (trapezoid, gauss_hermite):
+        with pytest.raises(ValueError, match=r"floating type, and not of torch\.int64"):
+            rule(5, dtype=torch.int64)
+    with pytest.raises(ValueError, match=r"floating type, and not of torch\.int64"):
+        graded_trapezoid(torch.tensor(0), torch.tensor(1))
 
 
 def test_gauss_hermite_has_as_many_nodes_as_its_weights_survive() -> None:

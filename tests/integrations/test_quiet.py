@@ -138,6 +138,9 @@ def test_what_has_no_such_start_is_refused() -> None:
         quiet_start(PPO("MlpPolicy", Tank(), use_sde=True, device="cpu"))
     with pytest.raises(ValueError, match="CategoricalDistribution"):
         quiet_start(PPO("MlpPolicy", "CartPole-v1", device="cpu"))
+    for wrong in (PPO("MlpPolicy", Tank(), n_steps=64, device="cpu").policy, PPO):
+        with pytest.raises(ValueError, match="takes a model that is set up"):
+            quiet_start(wrong)
     with pytest.raises(ValueError, match=r"std=1.5 is out of reach: .* between .* and"):
         quiet_scale(ClippedNormal, 1.5)
     with pytest.raises(ValueError, match=r"not <class 'inbounds\.distributions\.scaled_beta\.ScaledBeta'>"):

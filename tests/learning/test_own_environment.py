@@ -12,7 +12,16 @@ from gymnasium.vector import VectorActionWrapper
 from gymnasium.vector.utils import batch_space
 
 from inbounds import robots
-from inbounds.learning import PolicyConfig, PPOConfig, Trainer, executed_std, read_curves, save_run, train
+from inbounds.learning import (
+    PolicyConfig,
+    PPOConfig,
+    TrainConfig,
+    Trainer,
+    executed_std,
+    read_curves,
+    save_run,
+    train,
+)
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.storage.run_store import config_of, save_policies
 from tests.learning.point import PointEnv
@@ -100,12 +109,20 @@ def test_a_run_that_is_longer_than_what_is_asked_for_keeps_its_length(tmp_path: 
 def test_what_is_of_another_type_or_size_is_named() -> None:
     with pytest.raises(ValueError, match="learning_rate must be a number, got '3e-4'"):
         PPOConfig(learning_rate="3e-4")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="learning_rate must be a number, got None"):
+        PPOConfig(learning_rate=None)  # type: ignore[arg-type]
+    for env in (None, 3, ""):
+        with pytest.raises(ValueError, match=f"env must be the id of an environment, got {env!r}"):
+            TrainConfig(env)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="state_dependent_std must be True or False"):
         PolicyConfig("gaussian", state_dependent_std="false")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="limits must be a Limits"):
         PolicyConfig("beta", limits={"concentration_max": 20.0})  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="initial_std must be positive"):
         PolicyConfig("beta", initial_std=0.0)
+    for scale in (1e8, 1e9, 1e10, 1e20, 1e150):  # a law of two bounds
+        assert executed_std("gaussian", scale) == pytest.approx(1.0, abs=1e-7)
+    assert executed_std("gaussian", 1e-200) == pytest.approx(0.0, abs=1e-150)
     with pytest.raises(ValueError, match="a scale must be positive"):
         executed_std("gaussian", 0.0)
     with pytest.raises(ValueError, match="3 action dimensions take 6 outputs, not 2"):

@@ -95,6 +95,7 @@ def _run(args: list[str]) -> int:
     from inbounds.cli import benchmark, options, training, watching
     from inbounds.headless import BackendError
 
+    parsed = False
     try:
         if args[:1] == ["bench"] and benchmark.find_root():
             return benchmark.run(args[1:])  # its options are its own
@@ -102,7 +103,7 @@ def _run(args: list[str]) -> int:
             from inbounds.cli.studying import study
 
             return study(args[1:])
-        command = options.parse(args)
+        command, parsed = options.parse(args), True
         if isinstance(command, options.Train):
             return training.run(command)
         if isinstance(command, options.Watch):
@@ -117,6 +118,9 @@ def _run(args: list[str]) -> int:
     except SystemExit as exit_:  # tyro has written its help, or what is wrong
         if is_unread(exit_):
             raise
+        if parsed:  # an environment's, or its module's
+            print(f"inbounds: the environment ended the process: sys.exit({exit_.code!r})", file=sys.stderr)
+            return exit_.code if exit_.code and isinstance(exit_.code, int) else 1
         if exit_.code == 0 and args[:2] != ["study", "dial"]:  # which has examples of its own
             examples = EXAMPLES.get(next(iter(args), ""), "\n".join(EXAMPLES.values()))
             print(f"\nexamples:\n{examples}")

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from inbounds.cli.errors import is_unread
 from inbounds.learning import Trainer
+from inbounds.learning.storage.whole_files import is_disk_full
 from inbounds.learning.training import Record
 
 SECONDS_BETWEEN_LINES = 1.0
@@ -40,8 +41,8 @@ class TrainingProgress:
 
     def __init__(self, epochs: int, console: Console | None = None) -> None:
         self.epochs = epochs
-        self.unread = False
-        """Whether what was written last found no reader."""
+        self.unread: tuple[str, int] | None = None
+        """Why what was written last did not arrive, and the exit code for it."""
         # In a notebook too, plain lines: they can be read in the stored file.
         self.console = console or Console(highlight=False, force_jupyter=False)
         self.moves = self.console.is_terminal and not self.console.is_dumb_terminal
@@ -83,10 +84,12 @@ class TrainingProgress:
         """Write a line, above the bar."""
         try:
             self.console.print(text, markup=False, soft_wrap=True)
-        except (BrokenPipeError, SystemExit) as error:
-            if not is_unread(error):
+        except (OSError, SystemExit) as error:
+            if not is_unread(error) and not is_disk_full(error):
                 raise
-            self.unread = True  # in mid-epoch, perhaps: whoever asks stops at its end
+            # In mid-epoch, perhaps: whoever asks stops at its end.
+            nobody = "nobody reads the output any more", 141
+            self.unread = nobody if is_unread(error) else ("the output's disk is full", 1)
 
     def _picture(self, text: str, done: int) -> Group:
         """Return the numbers, and a bar below them that is as wide as the terminal."""

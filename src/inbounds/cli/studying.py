@@ -291,6 +291,8 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
 
     if command.random < 0 or command.epochs < 1:
         raise ValueError("--random takes 0 or more cells, and --epochs 1 or more")
+    if command.random and command.rerun:
+        raise ValueError("--rerun names the cells and --random chooses them: give one of the two")
     rerun = select(command.rerun, cells) if command.rerun else None
     if command.random:
         finished = [cell for cell in cells if command.folder().state(cell) == "finished"]

@@ -80,10 +80,11 @@ def run(command: Train) -> int:
         CommandError: what was asked for cannot be had, or cannot be kept; the message names the fix.
     """
     config, run_dir = command.train_config(), command.run_dir()
+    folder = run_dir.absolute()  # from here on an environment may change the directory
+    room = run_dir if os.path.exists(run_dir) else next(p for p in folder.parents if os.path.exists(p))
     _check_environment(config)
-    room = next(path for path in (run_dir, *run_dir.absolute().parents) if os.path.exists(path))
-    with _claimed(run_dir):
-        return _Session(command, config, run_dir, room).run()
+    with _claimed(folder):
+        return _Session(command, config, run_dir, folder, room).run()
 
 
 STEP_SIZE = {
@@ -97,11 +98,12 @@ STEP_SIZE = {
 class _Session:
     """One process' part of a run: what it does after every epoch, and what it says when it ends."""
 
-    def __init__(self, command: Train, config: TrainConfig, run_dir: Path, room: Path) -> None:
-        self.done = self.kept = _epochs_kept(run_dir, config)
+    def __init__(self, command: Train, config: TrainConfig, run_dir: Path, folder: Path, room: Path) -> None:
+        self.done = self.kept = _epochs_kept(folder, config)
         # A run that has more epochs than are asked for keeps them, and goes on saying so.
         self.config = dataclasses.replace(config, epochs=max(config.epochs, self.done))
-        self.run_dir, self.stop = run_dir, Stop()
+        self.run_dir, self.folder = run_dir, folder  # as it was named, and wherever the process is
+        self.stop = Stop()
         self.room = room  # the run directory, or the folder that it would be made in
         self.wants_tensorboard = command.tensorboard
 
@@ -121,7 +123,7 @@ class _Session:
                         raise
                     raise CommandError(str(error), 2) from error
             if self.wants_tensorboard:  # when nothing is left that could refuse the command
-                board = TensorBoardWriter(self.run_dir / "tensorboard", config.seeds)
+                board = TensorBoardWriter(self.folder / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
             if start:
                 progress.say(f"going on with {self.run_dir}, {_epochs(start)} done")
@@ -129,7 +131,7 @@ class _Session:
                 with self.stop.listening():
                     trainer = train(
                         config,
-                        run_dir=self.run_dir,
+                        run_dir=self.folder,
                         callback=lambda trainer, record: self._after_epoch(trainer, record, watchers),
                     )
                     self._save(trainer)
@@ -149,7 +151,7 @@ class _Session:
                 if not (is_ours(error) or is_disk_full(error)):
                     raise  # the environment's own
                 raise self._unwritten(error) from error
-            except Exception:  # the environment's own, too
+            except (Exception, SystemExit):  # the environment's own, too
                 progress.say(self._kept("stopped by an error"))
                 raise
         return self._conclude(trainer, start)
@@ -158,21 +160,23 @@ class _Session:
         self.done = len(trainer.records)
         if self.done % self.config.checkpoint_every == 0 or self.done == self.config.epochs:
             self.kept = self.done  # `train` has just written the checkpoint
-            save_run(self.run_dir, trainer)
+            save_run(self.folder, trainer)
         for watcher in watchers:
             watcher(trainer, record)
-        if self.stop.signal is not None or self.progress.unread:
+        if self.stop.signal is not None:
             self._save(trainer)
-            if self.stop.signal is not None:
-                raise Stopped("stopped", 128 + self.stop.signal)
-            raise Stopped("stopped, because nobody reads the output any more", 141)
+            raise Stopped("stopped", 128 + self.stop.signal)
+        if self.progress.unread is not None:
+            self._save(trainer)
+            why, exit_code = self.progress.unread
+            raise Stopped(f"stopped, because {why}", exit_code)
 
     def _save(self, trainer: Trainer) -> None:
         """Have all files say the same, also where `train` leaves no checkpoint or was killed between two files."""
         if self.kept < len(trainer.records):
-            checkpoint.save(self.run_dir / CHECKPOINT_FILE, trainer.state_dict())
+            checkpoint.save(self.folder / CHECKPOINT_FILE, trainer.state_dict())
             self.kept = len(trainer.records)
-        save_run(self.run_dir, trainer)
+        save_run(self.folder, trainer)
 
     def _conclude(self, trainer: Trainer, start: int) -> int:
         if trainer.diverged.all():
@@ -261,6 +265,10 @@ def _epochs_kept(run_dir: Path, config: TrainConfig) -> int:
         state = load_checkpoint(run_dir)
     except DamagedFileError as error:
         raise CommandError(str(error)) from error
+    except FileNotFoundError as error:  # a folder of that name
+        raise CommandError(
+            f"{run_dir / CHECKPOINT_FILE} is no file: choose another --out, or move it out of the way"
+        ) from error
     except PermissionError as error:
         raise CommandError(
             f"{run_dir}: its checkpoint cannot be read ({error.strerror}): change its permissions"

@@ -99,6 +99,7 @@ def trapezoid(
         [-4.0, -2.0, 0.0, 2.0, 4.0]
     """
     _check_trapezoid(num_nodes, half_width)
+    _check_floating(dtype)
     nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype, device=device)
     step = 2 * half_width / (num_nodes - 1)
     weights = step * standard_normal_pdf(nodes)
@@ -107,10 +108,16 @@ def trapezoid(
 
 
 def _check_trapezoid(num_nodes: int, half_width: float) -> None:
-    if num_nodes < 2 or not half_width > 0:
+    if num_nodes < 2 or not 0 < half_width < math.inf:
         raise ValueError(
-            f"the trapezoid rule needs num_nodes >= 2 and half_width > 0, got {num_nodes} and {half_width}"
+            "the trapezoid rule needs num_nodes >= 2 and a finite half_width > 0, "
+            f"got {num_nodes} and {half_width}"
         )
+
+
+def _check_floating(dtype: torch.dtype) -> None:
+    if not dtype.is_floating_point:
+        raise ValueError(f"a rule is of a floating type, and not of {dtype}")
 
 
 _MOST_HERMITE_NODES = 370
@@ -142,6 +149,7 @@ def gauss_hermite(
             f"the Gauss-Hermite rule needs num_nodes from 1 to {_MOST_HERMITE_NODES}, got {num_nodes}"
             + (": take the trapezoid rule" if num_nodes > 1 else "")
         )
+    _check_floating(dtype)
     nodes, weights = np.polynomial.hermite_e.hermegauss(num_nodes)  # weight function exp(−x²/2)
     return Rule(
         torch.as_tensor(nodes, dtype=dtype, device=device),
@@ -189,6 +197,7 @@ def graded_trapezoid(
     if half_width is None:
         half_width = 10.0 if double else 7.0
     _check_trapezoid(num_nodes, half_width)
+    _check_floating(loc.dtype)
     loc, scale = loc.detach().unsqueeze(-1), scale.detach().unsqueeze(-1)
     centre = (-loc / scale).clamp(-half_width, half_width)
     rate = scale / (2 * math.pi)

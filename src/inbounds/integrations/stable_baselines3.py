@@ -194,7 +194,7 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         The same model.
 
     Raises:
-        ValueError: a policy of another kind or one that has been trained, or a std out of reach.
+        ValueError: no model, a policy of another kind or one that has been trained, or a std out of reach.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -202,7 +202,9 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         >>> round(model.policy.log_std.exp().item(), 3)  # N·m, of a box of ±2: 0.4 of half the range, when clipped
         0.81
     """
-    policy: Any = model.policy
+    policy: Any = getattr(model, "policy", None)
+    if policy is None:
+        raise ValueError(f"quiet_start takes a model that is set up, quiet_start(PPO(…)), and not {model!r}")
     kind = type(getattr(policy, "action_dist", policy))
     if kind not in (DiagGaussianDistribution, LogitNormalDistribution):
         raise ValueError(

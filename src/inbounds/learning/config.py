@@ -62,6 +62,8 @@ class TrainConfig:
     """Epochs between checkpoints, where a run directory is given; the last epoch always has one."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.env, str) or not self.env:
+            raise ValueError(f"env must be the id of an environment, got {self.env!r}")
         algorithms = tuple(kind for kind, _ in ALGORITHMS.values())
         for name, kinds in (
             ("algorithm", algorithms),

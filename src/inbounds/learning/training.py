@@ -258,11 +258,11 @@ def train(
         >>> run.finished, run.records[0]["diverged"].tolist()
         (True, [False, False])
     """
+    folder = None if run_dir is None else Path(run_dir).absolute()  # an environment may change the directory
     trainer = Trainer(config, make_envs)
     with contextlib.ExitStack() as stack:
         path = None
-        if run_dir is not None:
-            folder = Path(run_dir)
+        if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
             try:
                 stack.enter_context(held(folder))

@@ -159,6 +159,19 @@ def test_the_file_alone_is_enough_to_act(tmp_path: Path) -> None:
     assert {"torch", "mujoco", "numpy"} <= metadata["versions"].keys()
 
 
+def test_a_seed_does_for_a_generator(tmp_path: Path) -> None:
+    saved_run(tmp_path, family="logit-normal")
+    policy, obs = load_policy(tmp_path), np.array([0.3, -0.2, 0.5])
+    drawn = policy.act(obs, "sample", 7)
+    np.testing.assert_array_equal(drawn, policy.act(obs, "sample", np.random.default_rng(7)))
+
+
+def test_a_run_without_an_epoch_has_no_curves(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="a run without an epoch has no curves"):
+        save_run(tmp_path, Trainer(preset("common", "Swimmer-v5", seeds=1)))
+    assert not list(tmp_path.iterdir())
+
+
 def test_samples_follow_the_law(tmp_path: Path) -> None:
     saved_run(tmp_path, family="logit-normal")
     policy = load_policy(tmp_path)

@@ -73,7 +73,7 @@ def graders_shown(notebook: Path) -> dict[int, str]:
         code = {n: "".join(cell["source"]) for n, cell in enumerate(cells) if cell["cell_type"] == "code"}
     except OSError as error:
         raise ValueError(f"this file cannot be read ({error.strerror or error}): ask for it again") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ValueError("this file is no notebook: ask for it again") from error
     return {n: name for n, source in code.items() if (name := grader_shown(source))}
 

@@ -117,10 +117,11 @@ def in_box(parameters: NormalParameters, low: Tensor, high: Tensor) -> tuple[Ten
 
 def clipped_std(scale: float) -> float:
     """Return the standard deviation of a centred Normal after a clip to [−1, 1]."""
-    bound = 1 / scale  # E[u²] = σ² E[ε²; |ε| < 1/σ] + P(|ε| > 1/σ)
+    bound = min(1 / scale, 1e150)  # E[u²] = σ² E[ε²; |ε| < 1/σ] + P(|ε| > 1/σ)
     outside = math.erfc(bound / math.sqrt(2))
     density = math.exp(-(bound**2) / 2) / math.sqrt(2 * math.pi)
-    return math.sqrt(scale**2 * (1 - outside - 2 * bound * density) + outside)
+    inside = scale**2 * (1 - outside - 2 * bound * density)  # of a very wide Normal nothing but rounding
+    return math.sqrt(min(max(inside, 0.0) + outside, 1.0))
 
 
 def normal_scales(limits: Limits) -> tuple[float, float]:

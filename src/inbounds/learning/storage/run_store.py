@@ -75,7 +75,14 @@ def save_run(run_dir: str | Path, trainer: Run) -> None:
     Args:
         run_dir: the folder; it must exist.
         trainer: what `train` returned, with at least one epoch done. (`load_policy` has an example.)
+
+    Raises:
+        ValueError: no epoch is done.
     """
+    if not trainer.records:
+        raise ValueError(
+            "a run without an epoch has no curves: train one, or keep its policies by save_policies"
+        )
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)
 

@@ -98,7 +98,7 @@ class TrainedPolicy:
         return (*self._policy.family.greedy, "sample")
 
     def act(
-        self, obs: ArrayLike, greedy: str = "median", rng: np.random.Generator | None = None
+        self, obs: ArrayLike, greedy: str = "median", rng: np.random.Generator | int | None = None
     ) -> NDArray[Any]:
         """Return actions for observations, both as the environment has them.
 
@@ -106,7 +106,7 @@ class TrainedPolicy:
             obs: `[O]` or `[B, O]`, flattened where one observation has several axes.
             greedy: "mean", "median", "mode" or "sample", of `greedy_choices`. Of the first three the median alone is
                 left in place by a change of variables.
-            rng: where "sample" draws from; None is a generator seeded by the system.
+            rng: where "sample" draws from, or the seed of it; None is a generator seeded by the system.
 
         Returns:
             `[A]` or `[B, A]`, in the robot's units, within the box (a sample under `action_mode="raw"` may leave it);
@@ -125,7 +125,7 @@ class TrainedPolicy:
         if self.diverged or not len(outputs):  # a part of a diverged policy's weights may be finite
             return np.broadcast_to(self._policy.centre.astype(self._policy.dtype), shape).copy()
         if greedy == "sample":
-            rng = np.random.default_rng() if rng is None else rng
+            rng = np.random.default_rng(rng)
             action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
         else:
             action = self._policy.greedy(torch.from_numpy(outputs), greedy)

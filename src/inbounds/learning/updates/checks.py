@@ -51,7 +51,8 @@ def check(
     for names, rule, holds in rules:
         for name in names:
             value = getattr(config, name)
-            if value is not None and not isinstance(value, Real):  # YAML reads 3e-4, without a dot, as a word
+            may_be_none = names is positive_or_none and value is None
+            if not may_be_none and not isinstance(value, Real):  # YAML reads 3e-4, without a dot, as a word
                 raise ValueError(f"{name} must be a number, got {value!r}")
             if not holds(value):
                 raise ValueError(f"{name} must {rule}, got {value}")
