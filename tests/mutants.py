@@ -463,8 +463,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "matched noise ignores the atoms",
         "learning/families/gaussian.py",
-        "+ outside)",
-        "+ 0 * outside)",
+        "+ outside, 1.0)",
+        "+ 0 * outside, 1.0)",
         "tests/learning/families/test_policies.py::test_initial_std_is_the_executed_standard_deviation",
     ),
     Mutant(
