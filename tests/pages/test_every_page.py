@@ -307,6 +307,7 @@ def test_figures_are_numbered_and_say_what_their_alt_text_says(visit: Visit) -> 
 def test_axe_finds_nothing_serious_in_either_theme(visit: Visit) -> None:
     """The last one, because it thins the page out."""
     visit.page.set_viewport_size(book.DESKTOP)
+    visit.page.wait_for_timeout(400)  # 0.3 s after a new width the theme looks for what scrolls anew
     visit.page.evaluate(book.AT_REST)
     visit.page.evaluate(THIN_OUT)
     visit.page.evaluate(AXE)
