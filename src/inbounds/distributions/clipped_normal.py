@@ -159,7 +159,7 @@ class ClippedNormal(BoundedDistribution):
     @property
     def mean(self) -> Tensor:
         """`[...]` mean of the clipped value, in closed form, measured from the median: always within the bounds."""
-        return torch.clamp(self._mean().to(self.low.dtype), self.low, self.high)
+        return torch.clamp(self._mean(self._parts()).to(self.low.dtype), self.low, self.high)
 
     @property
     def variance(self) -> Tensor:
@@ -169,11 +169,12 @@ class ClippedNormal(BoundedDistribution):
         mass inside goes to 0: with the mean m, E[(high − a)(a − low)] = (high − m)(m − low) − variance lies between 0
         and that mass times a quarter of the squared length of the box.
         """
-        _, first, second = self._moments()
+        parts = self._parts()
+        _, first, second = self._moments(parts)
         variance = self.scale.double().square() * (second - first.square()).clamp(min=0)
-        low, high, mean = self.low.double(), self.high.double(), self._mean()
+        low, high, mean = self.low.double(), self.high.double(), self._mean(parts)
         most = (high - mean) * (mean - low)
-        least = (most - ((high - low) / 2).square() * self._parts().m0).clamp(min=0)
+        least = (most - ((high - low) / 2).square() * parts.m0).clamp(min=0)
         return torch.minimum(torch.maximum(variance, least), most).to(self.low.dtype)
 
     @property
@@ -207,17 +208,15 @@ class ClippedNormal(BoundedDistribution):
         loc, scale = self.loc.double(), self.scale.double()
         return _Parts.of((self.low.double() - loc) / scale, (self.high.double() - loc) / scale)
 
-    def _mean(self) -> Tensor:
-        parts = self._parts()
+    def _mean(self, parts: _Parts) -> Tensor:
         loc, scale, low, high = (x.double() for x in (self.loc, self.scale, self.low, self.high))
         pivot = torch.clamp(loc, low, high).detach()  # on paper, the mean does not depend on it
         on_bounds = (low - pivot) * parts.log_low.exp() + (high - pivot) * parts.log_high.exp()
         between = scale * parts.m1 + (loc - pivot) * parts.m0
         return pivot + on_bounds + between
 
-    def _moments(self) -> tuple[Tensor, Tensor, Tensor]:
+    def _moments(self, parts: _Parts) -> tuple[Tensor, Tensor, Tensor]:
         """Return a pivot c (the standardised median) and E[s − c], E[(s − c)²] for s = (a − loc)/scale."""
-        parts = self._parts()
         c = torch.clamp(torch.zeros_like(parts.lower), parts.lower, parts.upper).detach()
         mass_low, mass_high = parts.log_low.exp(), parts.log_high.exp()
         first = (parts.lower - c) * mass_low + (parts.upper - c) * mass_high + parts.m1 - c * parts.m0
