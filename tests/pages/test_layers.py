@@ -14,7 +14,7 @@ SEVERAL = [
     "notebooks/reinforce_with_every_family.html",
     "notebooks/what_happened.html",
     "notebooks/logit_normal_moments.html",
-    "notebooks/one_thing_at_a_time.html",
+    "notebooks/objective_bonus_horizon.html",
 ]
 
 

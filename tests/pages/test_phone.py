@@ -80,7 +80,7 @@ def test_six_robots_stand_in_one_column_that_fits(page: Page, address: str, name
     assert wide != first.locator("source").evaluate(NARROW)
 
 
-@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
+@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/objective_bonus_horizon.html"])
 def test_every_figure_of_the_study_fits(page: Page, address: str, name: str) -> None:
     figures = on_a_phone(page, address + name).locator(".inbounds-study figure:has(img)")
     assert figures.count() >= 6
@@ -97,7 +97,7 @@ FAR = """tables => tables.map((table) => {
 }).filter(([seen]) => seen < 50)"""
 
 
-@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/one_thing_at_a_time.html"])
+@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/objective_bonus_horizon.html"])
 def test_the_first_result_stands_beside_the_name(page: Page, address: str, name: str) -> None:
     tables = on_a_phone(page, address + name).locator(".inbounds-study .table table")
     assert tables.count() >= 6

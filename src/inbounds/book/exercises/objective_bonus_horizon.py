@@ -1,4 +1,4 @@
-"""Graders of the page *One thing at a time* (`judging` tells how one works)."""
+"""Graders of the page *Objective, bonus, horizon* (`judging` tells how one works)."""
 
 from collections.abc import Callable
 from typing import Any

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from inbounds.book.exercises import one_thing_at_a_time as graders
+from inbounds.book.exercises import objective_bonus_horizon as graders
 
 
 def geometric(gamma: float, horizon: int) -> float:
