@@ -75,11 +75,12 @@ def test_robots_lie_where_they_lay(kept: dict[str, np.ndarray]) -> None:
             np.testing.assert_allclose(kept[f"{name}/asked"][:, :, 0], states[:, :, 0], atol=1e-9)
 
 
-def test_the_page_plays_nothing_whose_numbers_it_tells() -> None:
+def test_the_pages_play_nothing_whose_numbers_they_tell() -> None:
     """The instrument plays two policies, to be held against the package; the films and an exercise play for the eye."""
     code = [
         cell
-        for cell in cells_of(ROOT / "notebooks" / "inside_the_policies.ipynb")
+        for page in ("inside_the_policies", "how_the_robots_move", "why_swimmer_folds")
+        for cell in cells_of(ROOT / "notebooks" / f"{page}.ipynb")
         if cell.cell_type == "code"
     ]
     playing = [
