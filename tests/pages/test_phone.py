@@ -80,10 +80,13 @@ def test_six_robots_stand_in_one_column_that_fits(page: Page, address: str, name
     assert wide != first.locator("source").evaluate(NARROW)
 
 
-@pytest.mark.parametrize("name", ["notebooks/all_tables.html", "notebooks/objective_bonus_horizon.html"])
-def test_every_figure_of_the_study_fits(page: Page, address: str, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "at_least"),
+    [("notebooks/all_tables.html", 6), ("notebooks/objective_bonus_horizon.html", 5)],
+)
+def test_every_figure_of_the_study_fits(page: Page, address: str, name: str, at_least: int) -> None:
     figures = on_a_phone(page, address + name).locator(".inbounds-study figure:has(img)")
-    assert figures.count() >= 6
+    assert figures.count() >= at_least
     for figure in figures.all():
         assert figure.locator("picture source").count() == 1
         assert figure.evaluate("node => node.scrollWidth <= node.clientWidth")
