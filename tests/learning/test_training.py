@@ -525,6 +525,7 @@ def test_presets_are_the_table() -> None:
         (lambda: preset("commom"), "choose common or as-printed"),
         (lambda: preset("common", algo="sac"), "choose one of ppo, trpo"),
         (lambda: preset("common", policy="normal"), "choose one of gaussian"),
+        (lambda: preset("common", seeds=-1), "asks for -1 of them; at least 1"),
         (lambda: TrainConfig(seeds=()), "seeds must be different"),
         (lambda: TrainConfig(seeds=(1, 1)), "seeds must be different"),
         (lambda: TrainConfig(seeds=(1, 2**63)), "integers below 2⁶³"),
@@ -541,6 +542,12 @@ def test_presets_are_the_table() -> None:
 def test_bad_configurations_are_refused(wrong, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         wrong()
+
+
+@pytest.mark.parametrize("seeds", [2.5, True])
+def test_seeds_are_how_many_or_which(seeds: Any) -> None:
+    with pytest.raises(TypeError, match=r"how many \(10\), or which \(\(3, 7\)\); got " + str(seeds)):
+        preset("common", seeds=seeds)
 
 
 def test_one_environment_is_no_vector_of_them() -> None:

@@ -353,6 +353,15 @@ def test_the_room_knows_its_ids():
     assert done.stdout.strip() == "RobotVectorEnv(inbounds/Swimmer-v5, num_envs=3)"
 
 
+def test_one_by_itself_is_told_what_to_call():
+    with pytest.raises(
+        gymnasium.error.Error, match=r'make_vec\("inbounds/Hopper-v5", num_envs=10\).*make\("Hopper-v5"\)'
+    ):
+        gymnasium.make("inbounds/Hopper-v5")
+    spec = gymnasium.spec("inbounds/Hopper-v5")
+    assert gymnasium.envs.registration.EnvSpec.from_json(spec.to_json()) == spec
+
+
 def test_registering_twice_does_no_harm():
     registration.register()
     assert set(registration.TASK_NAMES) == set(TASKS)

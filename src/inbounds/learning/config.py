@@ -123,7 +123,8 @@ def preset(
         The configuration; change it with `dataclasses.replace`.
 
     Raises:
-        ValueError: no preset, algorithm or family of that name.
+        ValueError: no preset, algorithm or family of that name; no seed, or a number below one of them.
+        TypeError: `seeds` is neither a number nor several.
 
     Example:
         >>> config = preset("as-printed", "Hopper-v5", policy="beta", seeds=3)
@@ -132,9 +133,17 @@ def preset(
     """
     if algo not in ALGORITHMS:
         raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
+    if isinstance(seeds, bool | float):
+        raise TypeError(f"seeds is how many (10), or which ((3, 7)); got {seeds!r}")
+    if isinstance(seeds, int | np.integer):
+        if seeds < 1:
+            raise ValueError(
+                f"seeds={seeds} asks for {seeds} of them; at least 1, or say which: seeds=(3, 7)"
+            )
+        seeds = range(seeds)
     common = TrainConfig(
         env=env,
-        seeds=tuple(range(seeds) if isinstance(seeds, int | np.integer) else seeds),
+        seeds=tuple(seeds),
         epochs=epochs,
         algorithm=ALGORITHMS[algo][0](),
         policy=PolicyConfig(policy),

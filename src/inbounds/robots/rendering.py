@@ -217,16 +217,16 @@ def record(
     stride = max(1, math.ceil(1 / (max_fps * step_time) - 1e-9))
     num_frames = max(1, round(seconds / (stride * step_time)))
     obs, _ = env.reset(seed=seed)
-    frames, total_reward = [], 0.0
+    frames, total_reward = np.empty((num_frames, height, width, 3), np.uint8), 0.0
     with RobotRenderer(env, index=index, width=width, height=height, camera=camera) as renderer:
         for step in range(num_frames * stride):
             if step % stride == 0:
-                frames.append(renderer.frame())
+                frames[step // stride] = renderer.frame()
             obs, reward, terminated, truncated, _ = env.step(policy(obs))
             total_reward += float(reward[index] if is_vector else reward)
             if not is_vector and (terminated or truncated):
                 obs, _ = env.reset()
-    return Film(np.stack(frames), 1 / (stride * step_time), total_reward)
+    return Film(frames, 1 / (stride * step_time), total_reward)
 
 
 def is_drawable(env: Any) -> bool:
