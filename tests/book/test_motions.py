@@ -79,7 +79,12 @@ def test_the_pages_play_nothing_whose_numbers_they_tell() -> None:
     """The instrument plays two policies, to be held against the package; the films and an exercise play for the eye."""
     code = [
         cell
-        for page in ("inside_the_policies", "how_the_robots_move", "why_swimmer_folds")
+        for page in (
+            "inside_the_policies",
+            "how_the_robots_move",
+            "why_swimmer_folds",
+            "how_far_an_update_goes",
+        )
         for cell in cells_of(ROOT / "notebooks" / f"{page}.ipynb")
         if cell.cell_type == "code"
     ]
