@@ -53,10 +53,11 @@ class Target(gymnasium.Env):
         if self.fault == "pipe":
             raise BrokenPipeError("the simulator has gone")
         broken = self.fault == "nan" and self.steps == 128  # the last one of an epoch
-        return np.full(1, np.nan if broken else 0.0, np.float32), -abs(float(action[0])), False, False, {}
+        reward = -np.inf if self.fault == "infinite" and self.steps == 20 else -abs(float(action[0]))
+        return np.full(1, np.nan if broken else 0.0, np.float32), reward, False, False, {}
 
 
-for fault in ("", "reset", "away", "step", "exit", "late", "file", "pipe", "nan"):
+for fault in ("", "reset", "away", "step", "exit", "late", "file", "pipe", "nan", "infinite"):
     gymnasium.register(f"Target{fault}-v0", Target, kwargs={"fault": fault}, max_episode_steps=50)
 gymnasium.register("OwnHopper-v0", HopperEnv, max_episode_steps=50)
 '''
@@ -148,18 +149,33 @@ def test_an_environment_that_ends_the_process_is_told_from_a_call_for_help(folde
     assert "stopped by an error. 'my run' keeps 2 epochs" in late.stdout
 
 
+@pytest.mark.slow
+def test_a_run_that_goes_on_tells_what_its_environment_cannot(folder: Path) -> None:
+    told = (
+        "going on with my run, 2 epochs done; my_arm:Target-v0 cannot save its state, so new episodes begin"
+    )
+    train("Target-v0", folder)
+    assert "new episodes" not in train("Target-v0", folder).stdout  # there is nothing to do
+    assert told in train("Target-v0", folder, "--epochs", "3").stdout
+
+
 @pytest.mark.parametrize("env", [":", ":Env-v0", "my_arm:", "my_arm::Env-v0"])
 def test_half_an_environment_is_refused(env: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", env, *SMALL]) == 2
     assert f"{env!r} is no environment: give an id, or module:id. The tasks are" in capsys.readouterr().err
 
 
-def test_nan_observations_are_no_matter_of_the_learning_rate(folder: Path) -> None:
-    done = train("Targetnan-v0", folder)
+@pytest.mark.parametrize("fault", ["nan", "infinite"])
+def test_observations_and_rewards_that_are_no_numbers_are_no_matter_of_the_learning_rate(
+    fault: str, folder: Path
+) -> None:
+    done = train(f"Target{fault}-v0", folder)
     assert done.returncode == 1
+    assert done.stdout.count("warning: ") == 1
+    assert "warning: seeds [0, 1] diverged in epoch" in done.stdout
     assert "What helps: mend the environment, which has returned an observation" in done.stderr
     assert "learning" not in done.stderr + done.stdout
-    again = train("Targetnan-v0", folder)  # whose process has not seen why
+    again = train(f"Target{fault}-v0", folder)  # whose process has not seen why
     assert "smaller --algorithm.learning-rate" in again.stderr
     assert "that is NaN, mend the environment" in again.stderr
 

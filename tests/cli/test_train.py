@@ -281,7 +281,7 @@ def test_a_finished_run_is_left_as_it_is_and_can_be_prolonged(tmp_path: Path) ->
     before = contents(tmp_path / "run")
     assert "there was nothing to do: 2 epochs are done" in succeeds(small(tmp_path / "run", 2))
     assert contents(tmp_path / "run") == before
-    succeeds(small(tmp_path / "run", 4))
+    assert "new episodes" not in succeeds(small(tmp_path / "run", 4))  # our robots go on where they stood
     succeeds(small(tmp_path / "whole", 4))
     assert same_rows(read_curves(tmp_path / "run"), read_curves(tmp_path / "whole"))
     prolonged = contents(tmp_path / "run")

@@ -106,13 +106,13 @@ class TrainingProgress:
         """Return one line about one epoch."""
         healthy = ~record["diverged"]
         returns = self._returns[healthy & np.isfinite(self._returns)]
-        spread = f" ± {returns.std(ddof=1):.1f}" if len(returns) > 1 else ""
+        spread = f" ± {format_return(returns.std(ddof=1))}" if len(returns) > 1 else ""
         (then, steps_then), (now, steps_now) = self._recent[0], self._recent[-1]
         seconds = max(now - then, 1e-9)
         left = seconds / (len(self._recent) - 1) * max(self.epochs - done, 0)
         parts = [
             f"epoch {done}/{self.epochs}",
-            f"return {returns.mean():.1f}{spread}" if len(returns) else "return –",
+            f"return {format_return(returns.mean())}{spread}" if len(returns) else "return –",
             f"KL {_mean(record['kl'][healthy]):#.2g}",
             f"saturation {100 * _mean(record['saturation'][healthy]):.1f} %",
             f"{(steps_now - steps_then) / seconds:,.0f} steps/s",
@@ -121,6 +121,16 @@ class TrainingProgress:
         if not healthy.all():
             parts.append(f"{(~healthy).sum()} of {len(healthy)} seeds diverged")
         return "  ".join(parts)
+
+
+def format_return(value: float) -> str:
+    """Return a return, or its spread, as it is told: with one decimal, and a very large one by its first digits.
+
+    Example:
+        >>> format_return(-1234.56), format_return(1e32)
+        ('-1234.6', '1e+32')
+    """
+    return f"{value:.1f}" if abs(value) < 1e9 else f"{value:.3g}"
 
 
 def _mean(values: Any) -> float:

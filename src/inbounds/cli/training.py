@@ -82,9 +82,9 @@ def run(command: Train) -> int:
     config, run_dir = command.train_config(), command.run_dir()
     folder = run_dir.absolute()  # from here on an environment may change the directory
     room = run_dir if os.path.exists(run_dir) else next(p for p in folder.parents if os.path.exists(p))
-    _check_environment(config)
+    has_state = _check_environment(config)
     with _claimed(folder):
-        return _Session(command, config, run_dir, folder, room).run()
+        return _Session(command, config, run_dir, folder, room, has_state).run()
 
 
 STEP_SIZE = {
@@ -98,13 +98,16 @@ STEP_SIZE = {
 class _Session:
     """One process' part of a run: what it does after every epoch, and what it says when it ends."""
 
-    def __init__(self, command: Train, config: TrainConfig, run_dir: Path, folder: Path, room: Path) -> None:
+    def __init__(
+        self, command: Train, config: TrainConfig, run_dir: Path, folder: Path, room: Path, has_state: bool
+    ) -> None:
         self.done = self.kept = _epochs_kept(folder, config)
         # A run that has more epochs than are asked for keeps them, and goes on saying so.
         self.config = dataclasses.replace(config, epochs=max(config.epochs, self.done))
         self.run_dir, self.folder = run_dir, folder  # as it was named, and wherever the process is
         self.stop = Stop()
         self.room = room  # the run directory, or the folder that it would be made in
+        self.has_state = has_state  # of the environments: else an episode under way cannot be gone on with
         self.wants_tensorboard = command.tensorboard
 
     def run(self) -> int:
@@ -126,7 +129,9 @@ class _Session:
                 board = TensorBoardWriter(self.folder / "tensorboard", config.seeds)
                 watchers.append(stack.enter_context(board))
             if start:
-                progress.say(f"going on with {self.run_dir}, {_epochs(start)} done")
+                goes_on = self.has_state or start == config.epochs
+                anew = "" if goes_on else f"; {config.env} cannot save its state, so new episodes begin"
+                progress.say(f"going on with {self.run_dir}, {_epochs(start)} done{anew}")
             try:
                 with self.stop.listening():
                     trainer = train(
@@ -218,8 +223,8 @@ class _Session:
         return CommandError(f"{self.run_dir} cannot be written: {error}. Choose another --out")
 
 
-def _check_environment(config: TrainConfig) -> None:
-    """Raise unless the environment can be made; say what to ask for instead."""
+def _check_environment(config: TrainConfig) -> bool:
+    """Return whether the environment can save its state; raise unless it can be made, and say what to ask for."""
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
     if (versioned := f"{config.env.removeprefix('inbounds/')}-v5") in TASK_NAMES:
         raise CommandError(f"{config.env} names no version: ask for {versioned}", 2)
@@ -231,6 +236,7 @@ def _check_environment(config: TrainConfig) -> None:
         envs = make_environments(config, 1)
         check_environments(envs, 1)
         envs.close()
+        return hasattr(envs, "get_state")
     except BackendError:
         raise
     except gymnasium.error.UnregisteredEnv as error:

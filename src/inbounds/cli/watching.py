@@ -17,6 +17,7 @@ from inbounds.book.drawing.videos import require_encoder, write_film
 from inbounds.cli.errors import CommandError, is_ours
 from inbounds.cli.modules import find_modules_here, module_of
 from inbounds.cli.options import Watch, quoted
+from inbounds.cli.progress import format_return
 from inbounds.headless import BackendError
 from inbounds.learning.storage.run_store import POLICIES_FILE, load_policies
 from inbounds.learning.storage.trained_policy import TrainedPolicy
@@ -68,14 +69,14 @@ def run(command: Watch) -> int:
         room = " Free some space on the disk and repeat the command." if is_disk_full(error) else ""
         raise CommandError(f"{path} could not be written: {error.strerror or error}.{room}") from error
     print(f"{policy.config.env}, {policy.config.policy.family}, seed {policy.seed}, acting by {greedy}")
-    over = ", ".join(f"{value:.1f}" for value in envs.return_queue)
+    over = ", ".join(map(format_return, envs.return_queue))
     count = len(envs.return_queue)
     episodes = {0: "an episode under way", 1: f"one whole episode: {over}"}.get(
         count, f"{count} episodes: {over}"
     )
     if count and not math.isclose(film.total_reward, sum(envs.return_queue), abs_tol=1e-3):
         episodes += ", and one under way"
-    print(f"return {film.total_reward:.1f} in {len(film.frames) / film.fps:.1f} s ({episodes})")
+    print(f"return {format_return(film.total_reward)} in {len(film.frames) / film.fps:.1f} s ({episodes})")
     print(f"film: {path}")
     return 0
 

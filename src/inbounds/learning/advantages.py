@@ -51,9 +51,10 @@ def gae(
     decay = ((~(terminated | truncated)).to(value.dtype) * (gamma * gae_lambda)).numpy().T
     advantage = np.empty_like(residual)
     following = np.zeros_like(residual[0])
-    for t in reversed(range(len(residual))):
-        following = residual[t] + decay[t] * following
-        advantage[t] = following
+    with np.errstate(invalid="ignore"):  # 0 · ∞ is NaN; the trainer tells of infinite rewards
+        for t in reversed(range(len(residual))):
+            following = residual[t] + decay[t] * following
+            advantage[t] = following
     result = torch.from_numpy(advantage.T)  # [S, T]
     return result.contiguous(), result + value
 
