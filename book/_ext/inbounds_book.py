@@ -10,6 +10,7 @@
   the study to choose from loads that part's own.
 * Docstrings are read the way they are written (see ``shield``, ``restore`` and ``resolve_public_name``).
 * Numbers that a notebook glues into a sentence are set as the prose sets them (see ``set_numbers``).
+* An interval and a number with its per cent sign stay on one line (see ``keep_intervals``).
 * A full stop behind a DOI or an address stays with it (see ``keep_full_stops``).
 * Roles and labels that hide from a screen reader what others see are mended (see ``mend_labels``).
 * The theme that the system asks for is set before anything is drawn.
@@ -40,6 +41,7 @@ from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
 from inbounds.book.explorer.picked_seeds import SCRIPTS as SEEDS_SCRIPTS
 from inbounds.book.pages.glue import ROLE
 from inbounds.book.pages.programs import continued
+from inbounds.book.report.html import together
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
@@ -138,6 +140,9 @@ def deferred(script: Any) -> Any:
 
 
 MENDED = {
+    '<div class="proof admonition" id="proof">\n<p>Proof. ': (
+        '<div class="proof admonition" id="proof">\n<p><span class="proof-begins">Proof.</span> '
+    ),
     ' role="doc-biblioentry"': ' role="listitem"',  # deprecated by ARIA, and no child for the list around it
     ' aria-label="Toggle hidden content"': "",  # on a summary that says "Show code cell source"
 }
@@ -234,6 +239,16 @@ def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
                 text.parent.replace(text, nodes.Text(as_prose(text.astext())))
 
 
+def keep_intervals(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Keep the two ends of an interval on one line, and a per cent sign with its number, but for code and formulas."""
+    for text in list(doctree.findall(nodes.Text)):
+        if isinstance(text.parent, nodes.FixedTextElement | nodes.literal | nodes.math | nodes.raw):
+            continue
+        written = text.astext()
+        if (kept := together(written)) != written:
+            text.parent.replace(text, nodes.Text(kept))
+
+
 # "auto" shows the logo of either theme until the theme's script has run, and then the page moves.
 CHOOSE_THEME = """if (document.documentElement.dataset.theme === "auto")
   document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";"""
@@ -257,6 +272,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", restore, priority=600)
     app.connect("missing-reference", resolve_public_name)
     app.connect("doctree-resolved", set_numbers)
+    app.connect("doctree-resolved", keep_intervals, priority=600)  # when the glued numbers are set
     app.connect("builder-inited", copy_explorables)
     app.connect("env-get-outdated", read_again)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -6,6 +6,7 @@
   and one press opens them all.
 * In *read* what is built stays open: the section *Build it*, the exercises, and the cells of a chapter's program. A
   check shows its output; its code is one press away. Cells that only draw (``hide-input``) have a fold of their own.
+* What a program printed as a sentence wraps on a narrow page; columns scroll.
 * Figures get a number and a caption, which is their alt text: its first sentence, and the rest in a fold if it is long.
 """
 
@@ -21,11 +22,13 @@ STAYS_OPEN = ("Build it", "Exercises", "Exercise")
 PROGRAM = "tag_program"
 LONGEST_LABEL = 60  # characters of the first line
 LONGEST_CAPTION = 180  # characters of an alt text that is shown whole
-# What `inbounds.book.report.html.figure` writes.
+# What `inbounds.book.report.html.figure` writes, in one shape or in two.
 STUDY_FIGURE = re.compile(
-    r'(?P<picture><figure>\s*<img [^>]*? alt="(?P<alt>[^"]*)">\s*)<figcaption>(?P<caption>.*?)</figcaption>',
+    r'(?P<picture><figure>\s*(?:<picture>\s*<source [^>]*>\s*)?<img [^>]*? alt="(?P<alt>[^"]*)">\s*(?:</picture>\s*)?)'
+    r"<figcaption>(?P<caption>.*?)</figcaption>",
     re.DOTALL,
 )
+COLUMNS = re.compile(r"\S(?: {2,}|\t)\S")  # in a line that a program printed
 FIGURE = "inbounds-figure"  # the class that `inbounds.book.drawing.alt_text` gives a figure
 # Read before anything is drawn: what is folded must not be seen open first.
 CHOOSE = """document.documentElement.dataset.layer = "read";
@@ -92,6 +95,17 @@ def fold_code(app: Sphinx, doctree: nodes.document, docname: str) -> None:
                 child.parent = cell
 
 
+def let_sentences_wrap(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Mark what a program printed as sentences: a narrow page breaks their lines, and leaves columns as they are."""
+    if app.builder.format != "html":
+        return
+    for printed in doctree.findall(nodes.container):
+        if printed.get("nb_element") == "cell_code_output":
+            for block in printed.findall(nodes.literal_block):
+                if not COLUMNS.search(block.astext()):
+                    block["classes"].append("sentences")
+
+
 def caption(number: int, alt: str) -> str:
     """Return a figure's caption: what a reader hears who does not see the figure.
 
@@ -146,5 +160,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_js_file(None, body=CHOOSE, priority=1)
     app.connect("doctree-resolved", fold_code)
     app.connect("doctree-resolved", number_figures)
+    app.connect("doctree-resolved", let_sentences_wrap)
     app.connect("html-page-context", add_button, priority=950)  # the theme makes the list of buttons at 501
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -58,6 +58,18 @@ def test_only_glued_text_is_touched(extension: ModuleType) -> None:
     assert document.astext() == "−1\N{NARROW NO-BREAK SPACE}000-1,000"
 
 
+def test_an_interval_stays_on_its_line_and_a_list_of_code_is_left_alone(extension: ModuleType) -> None:
+    document = new_document("page")
+    said = "12 % more [−1571, 1\u202f058], of [3, 4, 5]"
+    document += nodes.paragraph("", said)
+    document += nodes.literal_block("", "[1, 2] at 12 %")
+    document += nodes.paragraph("", "", nodes.literal("", "[1, 2]"), nodes.math("", "[1, 2]"))
+    extension.keep_intervals(None, document, "page")
+    first, *others = document
+    assert first.astext() == "12\u00a0% more [−1571,\u00a01\u202f058], of [3, 4, 5]"
+    assert [other.astext() for other in others] == ["[1, 2] at 12 %", "[1, 2][1, 2]"]
+
+
 @pytest.fixture(scope="module")
 def metadata() -> ModuleType:
     return load("metadata")

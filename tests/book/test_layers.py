@@ -83,8 +83,10 @@ def test_figures_are_numbered_and_captioned_in_order(layers: ModuleType) -> None
 
 def test_figures_that_come_as_html_are_counted_with_the_others(layers: ModuleType) -> None:
     document = new_document("page")
-    shown = study_html.figure(plt.figure(), 'Bars of "both" laws & their intervals.', "All from one study.")
-    document += nodes.raw("", shown + shown, format="html")
+    alt = 'Bars of "both" laws & their intervals.'
+    one_shape = study_html.figure(plt.figure(), alt, "All from one study.")
+    two_shapes = study_html.figure_of(lambda narrow: plt.figure(), alt, "All from one study.")
+    document += nodes.raw("", one_shape + two_shapes, format="html")
     document += nodes.container(
         "", nodes.image(uri="a.png", alt="Two bars, of one height.", classes=["inbounds-figure"])
     )
@@ -93,6 +95,17 @@ def test_figures_that_come_as_html_are_counted_with_the_others(layers: ModuleTyp
     assert [text.count(f'<span class="number">Figure {i}.</span>') for i in (1, 2, 3, 4)] == [1, 1, 1, 0]
     assert text.count("<p>Bars of &#34;both&#34; laws &amp; their intervals.</p></details></figcaption>") == 2
     assert text.count("All from one study.") == 2
+
+
+def test_printed_sentences_wrap_and_columns_do_not(layers: ModuleType) -> None:
+    document = new_document("page")
+    said = "predicted 290 points an episode\nmeasured: 288", "x   y\n1   2", "a\tb"
+    for text in said:
+        document += nodes.container("", nodes.literal_block("", text), nb_element="cell_code_output")
+    document += nodes.literal_block("", "not printed")
+    layers.let_sentences_wrap(HTML, document, "page")
+    marked = ["sentences" in block["classes"] for block in document.findall(nodes.literal_block)]
+    assert marked == [True, False, False, False]
 
 
 def test_icons_of_pages_styles_and_scripts_are_found(tmp_path) -> None:

@@ -144,7 +144,9 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     rows = [row("logit-normal", -900, -100), *rows]
     assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
     assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's law."
-    assert "no law leads:" in answers.advice([*rows, row("beta", -900, -100)], "ppo")
+    none = "Under PPO no law is ahead on some robots and behind on none: keep your library's law."
+    assert answers.advice([*rows, row("beta", -900, -100)], "ppo") == none
+    assert "PPO the laws lead alike: keep your library's law." in answers.advice(rows[1:], "ppo")
 
 
 @pytest.mark.parametrize(

@@ -50,10 +50,15 @@ def first_choice(rows: Sequence[Evidence]) -> str:
         >>> first_choice([Evidence("Ant", "ppo", "beta", "final", ahead, study=1)])
         'beta'
     """
+    best = _leading_laws(rows)
+    return best[0] if len(best) == 1 else ""
+
+
+def _leading_laws(rows: Sequence[Evidence]) -> list[str]:
+    """Return the laws that lead on most robots and endpoints: one, none, or several alike."""
     signs = {law: [sign(row) for row in of(rows, law=law)] for law in LAWS}
     lead = {law: found.count(1) for law, found in signs.items() if 1 in found and -1 not in found}
-    best = [law for law, count in lead.items() if count == max(lead.values())]
-    return best[0] if len(best) == 1 else ""
+    return [law for law, count in lead.items() if count == max(lead.values())]
 
 
 def advice(rows: Sequence[Evidence], algorithm: str) -> str:
@@ -71,8 +76,9 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
     if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
         told = " too few robots have run: keep your library's law"
     else:
+        none = "no law is ahead on some robots and behind on none"
         told = {
-            "": " no law leads: keep your library's law",
+            "": f" {'the laws lead alike' if _leading_laws(here) else none}: keep your library's law",
             "beta": ", try the Beta",
             "logit-normal": ", try the logit-normal",
         }[first_choice(here)]

@@ -146,6 +146,7 @@ def forest(
                 face = "white" if bar.hollow else look.color
                 ax.plot(value, place, look.marker, color=look.color, markerfacecolor=face, markersize=7)
             ax.set_title(textwrap.fill(title, 22 if narrow else 26))
+            ax.tick_params(labelbottom=True)  # the next panel below may be a screen away
             ax.grid(visible=False, axis="y")
         first = axes[0, 0]
         first.set_yticks(range(len(groups)), groups)

@@ -5,6 +5,7 @@ Texts are plain and are escaped on the way (`templates/report.html`); the parts 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,20 @@ KIND = "inbounds-study"
 COLORS = 128
 """Of a figure in two shapes: as many as bands and lines need, and both together no more bytes than one with all."""
 _HTML = macros("report")
+_INTERVAL = re.compile(r"(?<=\[)([−-]?[\d.,\u202f]+), (?=[−-]?[\d.,\u202f]+\])")
+
+
+def together(text: str) -> str:
+    """Return a text in which no line ends between the two ends of an interval, or before a per cent sign.
+
+    Example:
+        >>> together("12 % [3, 21]").split()
+        ['12', '%', '[3,', '21]']
+        >>> " " in together("[3, 21]")
+        False
+    """
+    kept = _INTERVAL.sub("\\1,\N{NO-BREAK SPACE}", text)
+    return re.sub(r"(?<=\d) %", "\N{NO-BREAK SPACE}%", kept)
 
 
 @dataclass(frozen=True)
@@ -115,7 +130,7 @@ def figure(fig: Figure, alt: str, caption: str = "") -> str:
         ValueError: the alt text says less than a sentence would.
     """
     png, width = last_picture(fig, alt)
-    return str(_HTML.figure(png, width, alt, caption))
+    return str(_HTML.figure(png, width, alt, together(caption)))
 
 
 def figure_of(draw: Callable[[bool], Figure], alt: str, caption: str = "") -> str:
@@ -131,7 +146,7 @@ def figure_of(draw: Callable[[bool], Figure], alt: str, caption: str = "") -> st
     """
     narrow, narrow_width = last_picture(draw(True), alt, colors=COLORS)
     png, width = last_picture(draw(False), alt, colors=COLORS)
-    return str(_HTML.figure(png, width, alt, caption, narrow, narrow_width))
+    return str(_HTML.figure(png, width, alt, together(caption), narrow, narrow_width))
 
 
 def table(
@@ -154,7 +169,8 @@ def table(
         >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
         True
     """
-    return str(_HTML.table(caption, head, rows, words, anchors))
+    kept = [[together(text) for text in row] for row in rows]
+    return str(_HTML.table(together(caption), head, kept, words, anchors))
 
 
 def links(caption: str, columns: Sequence[str], fields: Mapping[str, Mapping[str, tuple[str, str]]]) -> str:

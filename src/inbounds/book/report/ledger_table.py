@@ -84,9 +84,9 @@ def counted(found: Sequence[Finding]) -> str:
 
 
 def decided(found: Sequence[Finding]) -> Shown:
-    """Return the claims that are decided, as a list; a paragraph where none is."""
+    """Return the claims that are decided, as a list without their numbers; a paragraph where none is."""
     told = [
-        f"{each.verdict.capitalize()}: {each.claim.says} ({', '.join(each.told.splitlines())})"
+        f"{each.verdict.capitalize()}: {each.claim.says}"
         for each in found
         if verdict(each) in ("supported", "refuted")
     ]
