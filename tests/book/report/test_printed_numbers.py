@@ -405,7 +405,7 @@ def test_over_all_robots(endpoint: str) -> None:
     )
     assert len(rows) == 4
     for algorithm, *names, cells in rows:
-        told = re.findall(r"<td>([\d.]+) \[([\d.]+), ([\d.]+)\]</td>", cells)[ENDPOINTS.index(endpoint)]
+        told = re.findall(r"<td>([\d.]+) \[([\d.]+),\s([\d.]+)\]</td>", cells)[ENDPOINTS.index(endpoint)]
         sides = [unit_scores(algorithm.lower(), name.lower(), endpoint) for name in names]
         assert float(told[0]) == pytest.approx(better(*sides), abs=0.00501)
         rng = np.random.default_rng(list(algorithm.encode()))

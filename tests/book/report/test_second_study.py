@@ -6,6 +6,7 @@ import pytest
 
 from inbounds.book.report import second_study as views
 from inbounds.book.report import secondary_tests
+from inbounds.book.report.html import together
 from inbounds.study import second, words
 from inbounds.study.analysis import estimate
 from inbounds.study.grid import SECOND, second_cells
@@ -107,7 +108,7 @@ def test_a_comparison_that_waits_for_seeds_has_no_verdict(outcomes: Outcomes) ->
     rows = rows_of(secondary_tests.comparisons(outcomes))
     assert {row[1] for row in rows if row[4:5] == ["waits for seeds"]} == {"Swimmer"}
     gap = secondary_tests.difference(outcomes, "σ free or of the state", "gaussian", "Hopper")
-    assert ["PPO: Gaussian free σ − Gaussian σ(s)", "Hopper", "final return", spoken(gap)] in [
+    assert ["PPO: Gaussian free σ − Gaussian σ(s)", "Hopper", "final return", together(spoken(gap))] in [
         r[:4] for r in rows
     ]
 

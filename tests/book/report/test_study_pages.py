@@ -11,7 +11,7 @@ import pytest
 from inbounds.book.explorer.claims import claims
 from inbounds.book.report import arms, ledger_table, study_pages
 from inbounds.book.report.changes import GROUPS
-from inbounds.book.report.html import Shown
+from inbounds.book.report.html import Shown, together
 from inbounds.book.report.score_tables import PUBLISHED, THESIS
 from inbounds.book.report.study_report import write_report
 from inbounds.book.report.words import pair_name
@@ -123,7 +123,9 @@ def test_the_differences_found_are_those_that_the_score_sheet_counts(some: Outco
     (row,) = [row for row in rows if row[0] == f"Hopper, PPO\n{pair_name(contrast)}"]
     for text, endpoint in zip(row[1:], analysis.ENDPOINTS, strict=True):
         expected = analysis.differences(some, contrast, endpoint)["Hopper"]
-        assert text.replace("\n[", " [").startswith(f"{spoken(expected.difference)}\n{verdict(expected)}\np ")
+        assert text.replace("\n[", " [").startswith(
+            f"{together(spoken(expected.difference))}\n{verdict(expected)}\np "
+        )
 
 
 def test_published_scores_stand_beside_ours(some: Outcomes) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from inbounds.book.report import html
 from inbounds.book.report.arms import columns_of
+from inbounds.book.report.html import together
 from inbounds.book.report.study_report import write_report
 from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, analysis
@@ -121,7 +122,7 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     (there,) = [row for row in rows[1:] if row[2] != "missing"]
     assert there[:2] + there[-2:] == ["Hopper", "Beta", "10", "0"]
     outcome = Outcomes.read(folder).finished["standard-hopper-ppo-beta"]
-    assert there[2] == spoken(analysis.estimate(outcome, "final"))
+    assert there[2] == together(spoken(analysis.estimate(outcome, "final")))
     assert there[5] == spoken(analysis.estimate(outcome, "area", "iqm"))
     assert len(rows) == 1 + 3
     (endpoints,) = [caption for caption in page.tables if caption.startswith("Endpoints (PPO")]
@@ -148,7 +149,11 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
         for r in page.table("Differences of means (PPO, standard practice)")
         if r[:2] == ["Ant", "Logit-normal − Gaussian"]
     )
-    assert row[8:] == [spoken(gaps["Ant"].difference), verdict(gaps["Ant"]), p_value(gaps["Ant"].p_adjusted)]
+    assert row[8:] == [
+        together(spoken(gaps["Ant"].difference)),
+        verdict(gaps["Ant"]),
+        p_value(gaps["Ant"].p_adjusted),
+    ]
     without = page.table("Means of the cells concerned (PPO")
     assert [line[:2] + line[-1:] for line in without[1:]] == [["Swimmer", "Gaussian, clipped", "8"]]
     assert "Differences of means (PPO, standard practice, without seeds that diverged" in " ".join(
