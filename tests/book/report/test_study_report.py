@@ -10,7 +10,6 @@ import pytest
 
 from inbounds.book.report import html
 from inbounds.book.report.arms import columns_of
-from inbounds.book.report.html import together
 from inbounds.book.report.study_report import write_report
 from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, analysis
@@ -58,6 +57,7 @@ class Page(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         here = self.open[-1] if self.open else ""
+        data = data.replace("\N{NO-BREAK SPACE}", " ")
         if here == "caption":
             assert data not in self.tables, "two tables with one caption"
             self.caption = data
@@ -122,7 +122,7 @@ def test_one_cell_is_finished(tmp_path: Path) -> None:
     (there,) = [row for row in rows[1:] if row[2] != "missing"]
     assert there[:2] + there[-2:] == ["Hopper", "Beta", "10", "0"]
     outcome = Outcomes.read(folder).finished["standard-hopper-ppo-beta"]
-    assert there[2] == together(spoken(analysis.estimate(outcome, "final")))
+    assert there[2] == spoken(analysis.estimate(outcome, "final"))
     assert there[5] == spoken(analysis.estimate(outcome, "area", "iqm"))
     assert len(rows) == 1 + 3
     (endpoints,) = [caption for caption in page.tables if caption.startswith("Endpoints (PPO")]
@@ -150,7 +150,7 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
         if r[:2] == ["Ant", "Logit-normal − Gaussian"]
     )
     assert row[8:] == [
-        together(spoken(gaps["Ant"].difference)),
+        spoken(gaps["Ant"].difference),
         verdict(gaps["Ant"]),
         p_value(gaps["Ant"].p_adjusted),
     ]
