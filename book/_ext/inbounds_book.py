@@ -242,7 +242,10 @@ def set_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 def keep_intervals(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Keep the two ends of an interval on one line, and a per cent sign with its number, but for code and formulas."""
     for text in list(doctree.findall(nodes.Text)):
-        if isinstance(text.parent, nodes.FixedTextElement | nodes.literal | nodes.math | nodes.raw):
+        # Who made a figure's HTML anew has given its text no parent.
+        if text.parent is None or isinstance(
+            text.parent, nodes.FixedTextElement | nodes.literal | nodes.math | nodes.raw
+        ):
             continue
         written = text.astext()
         if (kept := together(written)) != written:
