@@ -23,11 +23,11 @@ _INTERVAL = re.compile(r"(?<=\[)([−-]?[\d.,\u202f]+), (?=[−-]?[\d.,\u202f]+\
 
 
 def together(text: str) -> str:
-    """Return a text in which no line ends within an interval, within "σ = 1", or before a per cent sign.
+    r"""Return a text in which no line ends within an interval, within "σ = 1", or before a per cent sign.
 
     Example:
         >>> together("12 % [3, 21] at σ = 1").split(" ")
-        ['12\\xa0%', '[3,\\xa021]', 'at', 'σ\\xa0=\\xa01']
+        ['12\xa0%', '[3,\xa021]', 'at', 'σ\xa0=\xa01']
     """
     kept = _INTERVAL.sub("\\1,\N{NO-BREAK SPACE}", text)
     kept = re.sub(r"(?<=\d) %", "\N{NO-BREAK SPACE}%", kept)
