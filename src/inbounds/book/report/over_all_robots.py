@@ -21,7 +21,7 @@ from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.statistics import Estimate
 from inbounds.study.words import percent, spoken
 
-NORMALIZED = "0: return of the first epoch, 1: final return, of PPO × Gaussian in arm 1"
+NORMALIZED = "0: return of the first epoch, 1: final return, of PPO's Gaussian from its usual start"
 
 
 def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
@@ -44,7 +44,8 @@ def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
         }
         alt = f"IQM of the normalised {name} over all robots ({title}). {in_words(found)}"
         draw = functools.partial(_iqm, found, f"normalised {name}")
-        parts.append(html.figure_of(draw, alt, f"IQM of all runs, normalised per robot ({NORMALIZED})."))
+        caption = f"{name.capitalize()}: IQM of all runs, normalised per robot ({NORMALIZED})."
+        parts.append(html.figure_of(draw, alt, caption))
     parts += [_improvement(outcomes, arm, title), *_without_diverged(outcomes, arm, title, columns)]
     parts += [_profiles(outcomes, f"{a.upper()}, {title}", columns[a]) for a in ALGORITHMS]
     return html.of_study(f"over all robots, {title}", *parts)
