@@ -248,7 +248,14 @@ def keep_intervals(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         ):
             continue
         written = text.astext()
-        if (kept := together(written)) != written:
+        before = text.parent[text.parent.index(text) - 1] if text.parent.index(text) else None
+        if (
+            isinstance(before, nodes.Element)
+            and "pasted-text" in before["classes"]
+            and written.startswith(" %")
+        ):
+            written = f"\N{NO-BREAK SPACE}{written[1:]}"
+        if (kept := together(written)) != text.astext():
             text.parent.replace(text, nodes.Text(kept))
 
 

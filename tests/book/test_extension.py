@@ -62,10 +62,13 @@ def test_an_interval_stays_on_its_line_and_a_list_of_code_is_left_alone(extensio
     document = new_document("page")
     said = "12 % more [−1571, 1\u202f058], of [3, 4, 5]"
     document += nodes.paragraph("", said)
+    glued = nodes.inline("", "40", classes=["pasted-text"])
+    document += nodes.paragraph("", "", nodes.Text("by "), glued, nodes.Text(" % or so"))
     document += nodes.literal_block("", "[1, 2] at 12 %")
     document += nodes.paragraph("", "", nodes.literal("", "[1, 2]"), nodes.math("", "[1, 2]"))
     extension.keep_intervals(None, document, "page")
-    first, *others = document
+    first, second, *others = document
+    assert second.astext() == "by 40\u00a0% or so"
     assert first.astext() == "12\u00a0% more [−1571,\u00a01\u202f058], of [3, 4, 5]"
     assert [other.astext() for other in others] == ["[1, 2] at 12 %", "[1, 2][1, 2]"]
 

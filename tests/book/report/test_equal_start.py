@@ -144,8 +144,8 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     rows = [row("logit-normal", -900, -100), *rows]
     assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
     assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's law."
-    none = "Under PPO no law is ahead on some robots and behind on none: keep your library's law."
-    assert answers.advice([*rows, row("beta", -900, -100)], "ppo") == none
+    none = "Under PPO no law is ahead somewhere and behind nowhere, by final return and by area"
+    assert answers.advice([*rows, row("beta", -900, -100)], "ppo") == f"{none}: keep your library's law."
     assert "PPO the laws lead alike: keep your library's law." in answers.advice(rows[1:], "ppo")
 
 
