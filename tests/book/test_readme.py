@@ -58,7 +58,7 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
 
 def test_a_law(outcomes: Outcomes) -> None:
     rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
-    assert answers.advice(rows, "ppo").endswith("by final return and by area: keep your library's law.")
+    assert answers.advice(rows, "ppo") == "Under PPO no law leads: keep your library's law."
     said = bullet("Then, under PPO, keep your library's law.")
     graded = {
         (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)

@@ -76,9 +76,9 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
     if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
         told = " too few robots have run: keep your library's law"
     else:
-        none = "no law is ahead somewhere and behind nowhere, by final return and by area"
+        none = "both laws lead alike" if _leading_laws(here) else "no law leads"
         told = {
-            "": f" {'the laws lead alike' if _leading_laws(here) else none}: keep your library's law",
+            "": f" {none}: keep your library's law",
             "beta": ", try the Beta",
             "logit-normal": ", try the logit-normal",
         }[first_choice(here)]
