@@ -247,16 +247,18 @@ def keep_intervals(app: Sphinx, doctree: nodes.document, docname: str) -> None:
             text.parent, nodes.FixedTextElement | nodes.literal | nodes.math | nodes.raw
         ):
             continue
-        written = text.astext()
-        before = text.parent[text.parent.index(text) - 1] if text.parent.index(text) else None
-        if (
-            isinstance(before, nodes.Element)
-            and "pasted-text" in before["classes"]
-            and written.startswith(" %")
-        ):
-            written = f"\N{NO-BREAK SPACE}{written[1:]}"
-        if (kept := together(written)) != text.astext():
+        # A glued number before it is a node of its own.
+        glued = text.startswith(" %") and follows_number(text)
+        kept = together(f"0{text.astext()}")[1:] if glued else together(text.astext())
+        if kept != text.astext():
             text.parent.replace(text, nodes.Text(kept))
+
+
+def follows_number(text: nodes.Text) -> bool:
+    """Whether a text stands behind a number that a notebook has glued into the sentence."""
+    place = text.parent.index(text)
+    before = text.parent[place - 1] if place else None
+    return isinstance(before, nodes.Element) and "pasted-text" in before["classes"]
 
 
 # "auto" shows the logo of either theme until the theme's script has run, and then the page moves.

@@ -144,9 +144,9 @@ def test_advice_waits_until_every_law_was_compared_on_every_robot() -> None:
     rows = [row("logit-normal", -900, -100), *rows]
     assert answers.advice(rows, "ppo") == "Under PPO, try the Beta."
     assert answers.advice(rows[:-1], "ppo") == "Under PPO too few robots have run: keep your library's law."
-    none = "Under PPO no law leads"
-    assert answers.advice([*rows, row("beta", -900, -100)], "ppo") == f"{none}: keep your library's law."
-    assert "PPO both laws lead alike: keep your library's law." in answers.advice(rows[1:], "ppo")
+    behind = [*rows, row("beta", -900, -100)]
+    assert answers.advice(behind, "ppo") == "Under PPO no law leads: keep your library's law."
+    assert answers.advice(rows[1:], "ppo") == "Under PPO both laws lead alike: keep your library's law."
 
 
 @pytest.mark.parametrize(

@@ -149,11 +149,7 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
         for r in page.table("Differences of means (PPO, standard practice)")
         if r[:2] == ["Ant", "Logit-normal − Gaussian"]
     )
-    assert row[8:] == [
-        spoken(gaps["Ant"].difference),
-        verdict(gaps["Ant"]),
-        p_value(gaps["Ant"].p_adjusted),
-    ]
+    assert row[8:] == [spoken(gaps["Ant"].difference), verdict(gaps["Ant"]), p_value(gaps["Ant"].p_adjusted)]
     without = page.table("Means of the cells concerned (PPO")
     assert [line[:2] + line[-1:] for line in without[1:]] == [["Swimmer", "Gaussian, clipped", "8"]]
     assert "Differences of means (PPO, standard practice, without seeds that diverged" in " ".join(

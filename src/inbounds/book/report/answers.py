@@ -75,13 +75,12 @@ def advice(rows: Sequence[Evidence], algorithm: str) -> str:
     here = of(rows, algorithm=algorithm)
     if any({row.robot for row in of(here, law=law)} != set(ROBOTS) for law in LAWS):
         told = " too few robots have run: keep your library's law"
+    elif choice := first_choice(here):
+        told = f", try the {BOUNDED[choice]}"
     else:
-        none = "both laws lead alike" if _leading_laws(here) else "no law leads"
-        told = {
-            "": f" {none}: keep your library's law",
-            "beta": ", try the Beta",
-            "logit-normal": ", try the logit-normal",
-        }[first_choice(here)]
+        told = (
+            f" {'both laws lead alike' if _leading_laws(here) else 'no law leads'}: keep your library's law"
+        )
     return f"Under {algorithm.upper()}{told}."
 
 
