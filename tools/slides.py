@@ -4,8 +4,9 @@
     python tools/slides.py --pages ppo trpo    these alone
 
 A deck is one HTML file: the question, what the class will know, each definition and statement without its proof, each
-figure, the exercises with their minutes, the summary. Arrow keys turn the slides; printed, each is a page. The pictures
-lie beside the decks, in `figures`, named by chapter and number, to be put into slides of one's own.
+figure, the exercises with their minutes, the summary. Arrow keys turn the slides; printed, each is a page. A slide with
+more to say than it has room is set smaller. The pictures lie beside the decks, in `figures`, named by chapter and
+number, to be put into slides of one's own.
 """
 
 import argparse
@@ -25,12 +26,25 @@ ROOT = Path(__file__).resolve().parents[1]
 HTML = ROOT / "_build" / "html"
 OUT = ROOT / "_build" / "slides"
 STYLE = Path(__file__).with_name("slides.css")
+FIGURES = "figure.inbounds-figure, figure:has(> picture)"  # a chapter's own, and those of the study
 TURN = """
 const slides = [...document.querySelectorAll('section.slide')];
 const now = () => Math.max(0, slides.findIndex((slide) => '#' + slide.id === location.hash));
 const go = (to) => { location.hash = slides[Math.min(slides.length - 1, Math.max(0, to))].id; };
-const show = () => slides.forEach((slide, i) => slide.classList.toggle('shown', i === now()));
+const fit = (slide) => {
+  slide.style.fontSize = '';
+  for (let percent = 95; percent >= 60 && slide.scrollHeight > innerHeight; percent -= 5) {
+    slide.style.fontSize = `${percent}%`;
+  }
+};
+const show = () => slides.forEach((slide, i) => {
+  slide.classList.toggle('shown', i === now());
+  if (i === now()) fit(slide);
+});
 addEventListener('hashchange', show);
+addEventListener('resize', show);
+addEventListener('load', show);
+document.fonts.ready.then(show);
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   const { key } = event;
@@ -46,6 +60,34 @@ show();
 """
 
 
+def section_title(section: Tag) -> str:
+    """Return a section's heading without its number; of the chapter itself with it."""
+    heading = section.find(["h1", "h2", "h3", "h4"])
+    text = " ".join(heading.get_text().replace("#", "").split()) if isinstance(heading, Tag) else ""
+    return re.sub(r"^\d+(\.\d+)+\.? ", "", text)
+
+
+def place_of(figure: Tag) -> str:
+    """Return where a figure stands: the heading of its section, or the title of the solution that it belongs to."""
+    solution = figure.find_parent(class_="solution")
+    if isinstance(solution, Tag) and (title := solution.select_one(".admonition-title")):
+        return title.get_text(" ", strip=True)
+    section = figure.find_parent("section")
+    return section_title(section) if isinstance(section, Tag) else ""
+
+
+def caption_of(figure: Tag) -> str:
+    """Return what stands below a figure, as HTML, without its number and the fold that tells what it shows."""
+    caption = figure.figcaption
+    if not isinstance(caption, Tag):
+        return ""
+    return "".join(
+        str(child)
+        for child in caption.children
+        if not (isinstance(child, Tag) and (child.name == "details" or "number" in child.get("class", [])))
+    ).strip()
+
+
 def parts(found: Tag) -> Iterator[tuple[str, str]]:
     """Give what stands on the slides of a chapter, in its order: a heading, and HTML.
 
@@ -55,7 +97,7 @@ def parts(found: Tag) -> Iterator[tuple[str, str]]:
     heading = one_document.title(found)
     question = found.select_one("h1 ~ p > strong")
     yield heading, f'<p class="question">{question.decode_contents() if question else ""}</p>'
-    wanted = "#what-you-will-know, div.proof:not([id=proof]), figure.inbounds-figure, #exercises, #summary"
+    wanted = f"#what-you-will-know, div.proof:not([id=proof]), {FIGURES}, #exercises, #summary"
     for each in found.select(wanted):
         if each.get("id") == "exercises":
             titles = [one.select_one(".admonition-title") for one in each.select("div.exercise")]
@@ -63,13 +105,9 @@ def parts(found: Tag) -> Iterator[tuple[str, str]]:
             if lines:
                 yield "Exercises", f'<ul class="exercises">{lines}</ul>'
         elif each.name == "section":
-            yield (
-                re.sub(r"^[\d.]+ ", "", one_document.heading_of(each)),
-                "".join(map(str, each.find_all(["ul", "ol"], recursive=False))),
-            )
+            yield section_title(each), "".join(map(str, each.find_all(["ul", "ol"], recursive=False)))
         elif each.name == "figure":
-            caption = each.select_one("figcaption > [aria-hidden]")
-            yield caption.get_text() if caption else "", str(each.img)
+            yield place_of(each), f"{each.img}<p>{caption_of(each)}</p>"
         else:
             title = each.select_one(".admonition-title")
             said = "".join(str(child) for child in each.children if child is not title)
@@ -84,14 +122,16 @@ def deck(book: Path, name: str, out: Path) -> int:
     for link in found.find_all("a"):
         link.unwrap()
     (out / "figures").mkdir(parents=True, exist_ok=True)
-    for number, picture in enumerate(found.select("figure.inbounds-figure img"), 1):
+    for number, picture in enumerate(found.select(f":is({FIGURES}) img"), 1):
         source = (book / "notebooks" / str(picture["src"])).resolve()
         target = out / "figures" / f"{name}-{number}{source.suffix}"
         shutil.copyfile(source, target)
         picture["src"] = f"figures/{target.name}"
+        picture["class"] = ["tall"] if int(picture.get("height", 0)) > int(picture.get("width", 0)) else []
     slides = list(parts(found))
     body = "\n".join(
-        f'<section class="slide" id="{i}"><h2>{html.escape(title)}</h2><div class="said">{said}</div></section>'
+        f'<section class="slide" id="{i}"><h2>{html.escape(title)}</h2><div class="said">{said}</div>'
+        f"<footer>{html.escape(slides[0][0])} · {i} / {len(slides)}</footer></section>"
         for i, (title, said) in enumerate(slides, 1)
     )
     styles = '<link rel="stylesheet" href="_static/formulas.css">'

@@ -25,12 +25,17 @@ PAGE = """<html><head><link rel="stylesheet" href="../_static/{name}.css"><scrip
 <p class="admonition-title">Theorem 1 (T)</p><p>It holds.</p></div>
 <div class="proof admonition" id="proof"><p>Because.</p></div>
 <figure class="inbounds-figure"><img src="../_images/a.png" alt="long">
-<figcaption><span aria-hidden="true">A curve.</span></figcaption></figure>
+<figcaption><span class="number">Figure 1.</span> <span aria-hidden="true">A curve.</span>
+<details><summary>What it shows</summary><p>It climbs.</p></details></figcaption></figure>
 <video aria-label="a film"><source src="../_images/film.mp4"></video>
 <video aria-label="a lost film"><source src="../_images/lost.mp4"></video>
 <button>press</button><script>alert(2)</script>
 <section id="exercises"><h2>Exercises</h2><div class="exercise admonition">
-<p class="admonition-title">Exercise 1 (five, 5 min)</p></div></section>
+<p class="admonition-title">Exercise 1 (five, 5 min)</p></div>
+<div class="solution"><p class="admonition-title">Solution to Exercise 1</p><section id="solution-content">
+<figure><picture><source srcset="../_images/narrow.png">
+<img src="../_images/a.png" alt="" width="2" height="3"></picture>
+<figcaption>Bars.</figcaption></figure></section></div></section>
 <section id="summary"><h2>Summary</h2><ul><li>End of {name}</li></ul></section>
 </section></article></body></html>"""
 NAMES = ["notebooks/one", "notebooks/two"]
@@ -125,19 +130,24 @@ def test_a_page_without_an_article_says_what_to_do(tools: tuple) -> None:
 
 
 def test_a_deck_has_statements_figures_and_exercises(tools: tuple, book: Path, tmp_path: Path) -> None:
-    assert tools[1].deck(book, "one", tmp_path) == 6
+    assert tools[1].deck(book, "one", tmp_path) == 7
     deck = BeautifulSoup((tmp_path / "one.html").read_text("utf8"), "html.parser")
     headings = [each.get_text() for each in deck.select(".slide > h2")]
-    assert headings == ["1. One", "What you will know", "Theorem 1 (T)", "A curve.", "Exercises", "Summary"]
+    ends = ["Exercises", "Solution to Exercise 1", "Summary"]
+    assert headings == ["1. One", "What you will know", "Theorem 1 (T)", "1. One", *ends]
     assert "Why one?" in deck.select_one(".question").get_text()
     assert "Because." not in deck.get_text()
-    assert (tmp_path / deck.select_one("img")["src"]).read_bytes() == b"picture"
+    assert [each.get_text() for each in deck.select("footer")][3] == "1. One · 4 / 7"
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_without_a_built_book_the_tools_say_what_to_do(
-    tools: tuple, which: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_deck_has_the_figures_of_the_chapter_and_of_the_study(
+    tools: tuple, book: Path, tmp_path: Path
 ) -> None:
-    tool = [importlib.import_module("print_book"), tools[1]][which]
-    assert tool.main(["--html", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
-    assert "make book" in capsys.readouterr().err
+    tools[1].deck(book, "one", tmp_path)
+    deck = BeautifulSoup((tmp_path / "one.html").read_text("utf8"), "html.parser")
+    curve, forest = deck.select(".said > img")
+    assert curve.find_next_sibling("p").get_text() == "A curve."
+    assert forest.find_next_sibling("p").get_text() == "Bars."
+    assert ("tall" in curve.get("class", []), "tall" in forest["class"]) == (False, True)
+    assert curve["src"] != forest["src"]
+    assert {(tmp_path / each["src"]).read_bytes() for each in (curve, forest)} == {b"picture"}

@@ -243,7 +243,7 @@ def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
     panels = {name: bars(of(here, endpoint=e)) for e, name in ENDPOINTS.items()}
     if not here:
         return html.of_study(what, html.NONE_FINISHED)
-    alt = f"Quiet minus plain Gaussian with 95 percent intervals. {in_words(panels)}"
+    alt = f"{algorithm.upper()}. Quiet minus plain Gaussian with 95 percent intervals. {in_words(panels)}"
     lacking = [robot for robot in ROBOTS if not of(here, robot=robot)]
     strip = [html.missing(f"Not run: {', '.join(lacking)}.")] if lacking else []
     return html.of_study(what, html.figure_of(of_robots(panels), alt, _caption({algorithm: here})), *strip)
@@ -253,7 +253,8 @@ def _drawn(panels: Mapping[str, Sequence[Evidence]]) -> str:
     drawn = {title: bars(rows) for title, rows in panels.items() if rows}
     if not drawn:
         return html.NONE_FINISHED
-    alt = f"Differences with 95 percent intervals, a group of rows per robot. {in_words(drawn)}"
+    said = "Differences with 95 percent intervals, a group of rows per robot."
+    alt = f"{_one_algorithm(panels)}{said} {in_words(drawn)}"
     return html.figure_of(of_robots(drawn), alt, _caption(panels))
 
 
@@ -261,8 +262,8 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
     rows = [row for found in panels.values() for row in found]
     studies = {row.study for row in rows}
     said = [
-        "Bars: 95 % bootstrap intervals of a difference of means. Grey: a difference too small to choose by, a fifth "
-        "of what training adds on the robot."
+        f"{_one_algorithm(panels)}Bars: 95 % bootstrap intervals of a difference of means. Grey: a difference too "
+        "small to choose by, a fifth of what training adds on the robot."
     ]
     if studies == {1, 2}:
         said.append(
@@ -274,6 +275,12 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
     return " ".join([*said, *lent(rows)])
+
+
+def _one_algorithm(panels: Mapping[str, Sequence[Evidence]]) -> str:
+    """Return the first sentence of a figure that has one algorithm; where panels differ in it, their titles say it."""
+    algorithms = {row.algorithm for rows in panels.values() for row in rows}
+    return f"{algorithms.pop().upper()}. " if len(algorithms) == 1 else ""
 
 
 def lent(rows: Sequence[Evidence]) -> list[str]:

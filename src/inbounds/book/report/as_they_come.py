@@ -127,8 +127,9 @@ def comparisons(rows: Sequence[Compared], arm: str, algorithm: str) -> Shown:
     panels = {name: [_bar(row) for row in of(here, endpoint=e)] for e, name in ENDPOINTS.items()}
     alt = f"Differences with 95 percent intervals ({title_of(arm, algorithm)}). {in_words(panels)}"
     caption = (
-        "Bars: 95 % bootstrap intervals of a difference of means, ten seeds a side. Filled: found after Holm's "
-        "correction over the robots; hollow: not. Grey: too small to choose by, a fifth of what training adds."
+        f"{title_of(arm, algorithm)}. Bars: 95 % bootstrap intervals of a difference of means, ten seeds a side. "
+        "Filled: found after Holm's correction over the robots; hollow: not. Grey: too small to choose by, a fifth of "
+        "what training adds."
     )
     return html.of_study(
         what, html.figure_of(of_robots(panels), alt, caption), *_missing(arm, algorithm, here)
