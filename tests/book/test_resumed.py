@@ -6,21 +6,28 @@ import pytest
 from inbounds.book.report.over_seeds import final_policies
 from inbounds.book.resumed import learn_values, resumed
 from inbounds.learning import Trainer
-from inbounds.study import StudyFolder
+from inbounds.study import StudyFolder, select
 from inbounds.study.outcomes import Outcomes
 
-OUTCOMES = Outcomes.read(StudyFolder())
-CELL = OUTCOMES.finished["standard-hopper-ppo-logit-normal"]
+CELL = "standard-hopper-ppo-logit-normal"
+FEWER_KEPT = "equal-hopper-trpo-beta"
+"""A cell that keeps the policies of some of its seeds."""
 
 
 @pytest.fixture(scope="module")
-def trainer() -> Trainer:
-    return resumed(OUTCOMES, CELL)
+def outcomes() -> Outcomes:
+    return Outcomes.read(StudyFolder(), select([CELL, FEWER_KEPT]))
 
 
-def test_they_are_the_stored_policies(trainer: Trainer) -> None:
-    obs = np.random.default_rng(0).normal(size=11)
-    for ours, stored in zip(trainer.policies, final_policies(OUTCOMES, CELL), strict=True):
+@pytest.fixture(scope="module")
+def trainer(outcomes: Outcomes) -> Trainer:
+    return resumed(outcomes, outcomes.finished[CELL])
+
+
+@pytest.mark.parametrize("cell", [CELL, FEWER_KEPT])
+def test_they_are_the_stored_policies(outcomes: Outcomes, cell: str) -> None:
+    obs, found = np.random.default_rng(0).normal(size=11), outcomes.finished[cell]
+    for ours, stored in zip(resumed(outcomes, found).policies, final_policies(outcomes, found), strict=True):
         np.testing.assert_allclose(ours.act(obs, "median"), stored.act(obs, "median"), rtol=1e-4, atol=1e-6)
 
 

@@ -152,6 +152,18 @@ def test_the_end_of_grading_is_the_end_of_the_students_process(tmp_path: Path) -
         os.kill(int(mark.read_text(encoding="utf8")), 0)
 
 
+@pytest.mark.slow
+def test_what_a_notebook_started_ends_with_it(tmp_path: Path) -> None:
+    mark = tmp_path / "pid"
+    cell = (
+        "import subprocess\nchild = subprocess.Popen(['sleep', '600'])\n"
+        f"open({str(mark)!r}, 'w').write(str(child.pid))"
+    )
+    assert graded(notebook(tmp_path / "a.ipynb", IMPORTS, cell, RIGHT, CALL))[0][1] == "passed"
+    state = Path(f"/proc/{mark.read_text(encoding='utf8')}/stat")
+    assert not state.exists() or state.read_text(encoding="utf8").split()[2] == "Z"
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [

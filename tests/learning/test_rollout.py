@@ -104,6 +104,13 @@ def test_raw_actions_leave_the_box_and_clipped_ones_do_not() -> None:
     assert np.allclose(raw.action_std, np.sqrt(executed.var(1).mean(1)))
 
 
+def test_an_environment_that_clips_takes_no_raw_actions() -> None:
+    config = dataclasses.replace(small_config(seeds=2), env="Hopper-v5")
+    of = Trainer(config).collector
+    with pytest.raises(ValueError, match="make the environments with it, too"):
+        Collector(of.envs, of.networks, of.streams, True, "raw")
+
+
 def test_observations_are_normalised_by_what_was_seen_so_far() -> None:
     acting = collector()
     seeds = [stream.environment for stream in acting.streams]

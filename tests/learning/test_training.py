@@ -412,6 +412,22 @@ def test_a_minibatch_of_one_can_be_prepared() -> None:
     assert prepare(dataclasses.replace(config, algorithm=algorithm), PointEnv) > 0
 
 
+def test_preparing_closes_what_it_makes_and_speaks_of_no_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = []
+
+    class Watched(PointEnv):
+        def step(self, actions: Any) -> Any:
+            obs, reward, *rest = super().step(actions)
+            return obs, reward * np.nan, *rest
+
+        def close(self, **kwargs: Any) -> None:
+            closed.append(True)
+
+    config = dataclasses.replace(small_config("trpo"), engine="compiled")
+    assert prepare(config, Watched) > 0
+    assert closed == [True]
+
+
 # ---- records, divergence, configuration
 
 
@@ -544,9 +560,9 @@ def test_bad_configurations_are_refused(wrong, message: str) -> None:
         wrong()
 
 
-@pytest.mark.parametrize("seeds", [2.5, True])
+@pytest.mark.parametrize("seeds", [2.5, True, "3", None])
 def test_seeds_are_how_many_or_which(seeds: Any) -> None:
-    with pytest.raises(TypeError, match=r"how many \(10\), or which \(\(3, 7\)\); got " + str(seeds)):
+    with pytest.raises(TypeError, match=r"how many \(10\), or which \(\(3, 7\)\); got " + repr(seeds)):
         preset("common", seeds=seeds)
 
 

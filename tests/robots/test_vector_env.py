@@ -291,6 +291,9 @@ def test_an_unstable_simulation_raises_where_warnings_are_errors():
         warnings.simplefilter("error")
         with pytest.raises(MujocoWarning, match="unstable"):
             envs.step(np.zeros((2, 3), np.float32))
+    state = envs.get_state()  # of a whole step
+    assert state["elapsed"].tolist() == [1, 1]
+    np.testing.assert_array_equal(state["obs"][0, 5:], np.clip(envs.get_data(0).qvel, -10, 10))
 
 
 # ── Pictures ─────────────────────────────────────────────────────────────────────────────────────────────────
@@ -387,7 +390,7 @@ def test_seeds_may_be_numpys() -> None:
     assert np.array_equal(envs.reset(seed=list(np.array([3, 4])))[0], expected)
 
 
-@pytest.mark.parametrize("seed", ["12", [1.9, 2.9], [1, 2, 3], ["1", "2"]])
+@pytest.mark.parametrize("seed", ["12", [1.9, 2.9], [1, 2, 3], ["1", "2"], 5.0])
 def test_what_is_no_seed_is_refused(seed) -> None:
     with pytest.raises(ValueError, match="one seed for each of the 2 robots, or one integer; got"):
         make("Swimmer-v5", 2).reset(seed=seed)

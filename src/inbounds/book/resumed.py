@@ -6,21 +6,21 @@ critics.
 
 from __future__ import annotations
 
-import dataclasses
-
 import torch
-from safetensors.numpy import load_file
 
 from inbounds.learning import Trainer
 from inbounds.learning.networks import SeedAdam
 from inbounds.study.outcomes import Outcome, Outcomes
+from inbounds.study.running.play_ways import run_with_policies
 
 FOREVER = 10**9
 """Observations that the statistics count for, so that new ones do not move them."""
+GAMMA = 0.99
+"""The study's discount per step."""
 
 
 def resumed(outcomes: Outcomes, outcome: Outcome) -> Trainer:
-    """Return a trainer that holds the final policies of a cell, all seeds, with their statistics of observations.
+    """Return a trainer that holds a cell's final policies, all that are kept, with their statistics of observations.
 
     Its critics know nothing yet, and its optimiser is new.
 
@@ -35,29 +35,16 @@ def resumed(outcomes: Outcomes, outcome: Outcome) -> Trainer:
         >>> len(trainer.policies)
         10
     """
-    stored = load_file(outcomes.folder.policy_files(outcome.cell)[0])
-    trainer = Trainer(dataclasses.replace(outcome.cell.config, engine="autograd"))
-    with torch.no_grad():
-        for i, layer in enumerate(trainer.networks.actor.layers):
-            layer.weight.copy_(torch.from_numpy(stored[f"policy.{i}.weight"]))
-            layer.bias[..., 0].copy_(torch.from_numpy(stored[f"policy.{i}.bias"]))
-    seen = trainer.collector.normalizer
-    assert seen is not None
-    seen.count = FOREVER
-    seen.mean[:] = stored["normalizer.mean"]
-    seen.squares[:] = stored["normalizer.variance"] * FOREVER
+    trainer = run_with_policies(outcome.cell, outcomes.folder, count=FOREVER, engine="autograd")
     trainer.collector.restart()  # the first observations, as these statistics show them
     return trainer
 
 
-def learn_values(
-    trainer: Trainer, gamma: float = 0.99, rounds: int = 2, steps: int = 120, horizon: int = 4096
-) -> None:
+def learn_values(trainer: Trainer, rounds: int = 2, steps: int = 120, horizon: int = 4096) -> None:
     """Let a trainer's critics learn the rewards to go of its policies, which stay as they are.
 
     Args:
         trainer: changed in place.
-        gamma: discount per step.
         rounds: rollouts, each of which a later one may bootstrap from.
         steps: of Adam for each, on minibatches of 1024.
         horizon: steps of a rollout.
@@ -67,7 +54,7 @@ def learn_values(
     random = torch.Generator().manual_seed(0)
     for k in range(rounds):
         rollout = trainer.collector.collect(horizon)
-        _, target = rollout.advantages(gamma, gae_lambda=1.0)
+        _, target = rollout.advantages(GAMMA, gae_lambda=1.0)
         centre, unit = target.mean(1, keepdim=True), target.std(1, keepdim=True)
         if k == 0:  # in the unit of the returns, or the regression would take forever to get there
             with torch.no_grad():

@@ -234,7 +234,7 @@ def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Console) -> int
     played = evaluate_cells(
         cells, command.folder(), lambda line: console.print(line, markup=False, soft_wrap=True)
     )
-    if publish_records([cell for cell in cells if cell.keeps_policies], command.folder()):
+    if publish_records(cells, command.folder()):
         console.print("records: played", markup=False)
     console.print(f"{len(played)} cells played now", markup=False)
     return 0

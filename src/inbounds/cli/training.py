@@ -163,7 +163,7 @@ class _Session:
 
     def _after_epoch(self, trainer: Trainer, record: Record, watchers: list[Any]) -> None:
         self.done = len(trainer.records)
-        if self.done % self.config.checkpoint_every == 0 or self.done == self.config.epochs:
+        if trainer.checkpoint_due:
             self.kept = self.done  # `train` has just written the checkpoint
             save_run(self.folder, trainer)
         for watcher in watchers:

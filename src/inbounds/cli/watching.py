@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 from pathlib import Path
@@ -45,14 +46,15 @@ def run(command: Watch) -> int:
     try:
         require_encoder()  # before the film is made, not after
         envs = RecordEpisodeStatistics(make_environments(policy.config, 1), buffer_length=sys.maxsize)
-        film = robots.record(
-            envs,
-            act,
-            seconds=command.seconds,
-            seed=command.env_seed,
-            width=command.width,
-            height=command.height,
-        )
+        with contextlib.closing(envs):
+            film = robots.record(
+                envs,
+                act,
+                seconds=command.seconds,
+                seed=command.env_seed,
+                width=command.width,
+                height=command.height,
+            )
     except BackendError:
         raise
     except (gymnasium.error.Error, ImportError) as error:

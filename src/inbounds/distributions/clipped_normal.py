@@ -170,7 +170,7 @@ class ClippedNormal(BoundedDistribution):
         and that mass times a quarter of the squared length of the box.
         """
         parts = self._parts()
-        _, first, second = self._moments(parts)
+        first, second = self._moments(parts)
         variance = self.scale.double().square() * (second - first.square()).clamp(min=0)
         low, high, mean = self.low.double(), self.high.double(), self._mean(parts)
         most = (high - mean) * (mean - low)
@@ -215,8 +215,8 @@ class ClippedNormal(BoundedDistribution):
         between = scale * parts.m1 + (loc - pivot) * parts.m0
         return pivot + on_bounds + between
 
-    def _moments(self, parts: _Parts) -> tuple[Tensor, Tensor, Tensor]:
-        """Return a pivot c (the standardised median) and E[s − c], E[(s − c)²] for s = (a − loc)/scale."""
+    def _moments(self, parts: _Parts) -> tuple[Tensor, Tensor]:
+        """Return E[s − c] and E[(s − c)²] of s = (a − loc)/scale, with the standardised median as the pivot c."""
         c = torch.clamp(torch.zeros_like(parts.lower), parts.lower, parts.upper).detach()
         mass_low, mass_high = parts.log_low.exp(), parts.log_high.exp()
         first = (parts.lower - c) * mass_low + (parts.upper - c) * mass_high + parts.m1 - c * parts.m0
@@ -227,7 +227,7 @@ class ClippedNormal(BoundedDistribution):
             - 2 * c * parts.m1
             + c.square() * parts.m0
         )
-        return c, first, second
+        return first, second
 
 
 class _Parts(NamedTuple):

@@ -156,7 +156,9 @@ class LogitNormalPolicy(ActorCriticPolicy):
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
         latent = _floating(scaled_action)
         law = self._law(torch.zeros_like(latent))
-        return law.latent_to_value(latent).numpy().astype(self.action_space.dtype)
+        low, high = self._bounds  # of a narrower type than the law's, they could be reached by rounding
+        value = law.latent_to_value(latent).numpy().astype(low.dtype)
+        return np.clip(value, np.nextafter(low, high), np.nextafter(high, low))
 
     def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
         """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""

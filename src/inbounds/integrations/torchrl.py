@@ -49,7 +49,7 @@ PARAMETERS: Mapping[type[LogitNormal | ScaledBeta], tuple[str, str]] = MappingPr
 
 
 LEAST_SCALE = 0.0101
-"""Of what TorchRL's `NormalParamExtractor` can give a little more than the least."""
+"""A little above 0.01, the smallest σ that TorchRL's `NormalParamExtractor` gives."""
 
 
 class Latents(Distribution):
@@ -216,7 +216,7 @@ class _BetaHead(nn.Module):
 
     def __init__(self, start: float) -> None:
         super().__init__()
-        excess = start - 1
+        excess = max(start - 1, math.ulp(1.0))
         self.shift = excess + math.log(-math.expm1(-excess))  # the softplus' inverse, without overflow
 
     def forward(self, outputs: Tensor) -> tuple[Tensor, ...]:

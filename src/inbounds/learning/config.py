@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Literal, TypeAlias
@@ -75,7 +75,10 @@ class TrainConfig:
                 raise TypeError(f"{name} must be a {wanted}, got {given!r}; `preset` takes names")
         if isinstance(self.seeds, int | np.integer):
             raise TypeError(f"seeds must be a sequence, got {self.seeds}; `preset` takes a number of seeds")
-        object.__setattr__(self, "seeds", tuple(map(operator.index, self.seeds)))  # NumPy's integers, too
+        try:
+            object.__setattr__(self, "seeds", tuple(map(operator.index, self.seeds)))  # NumPy's integers, too
+        except TypeError:
+            raise TypeError(f"seeds must be a sequence of integers, got {self.seeds!r}") from None
         check(self, positive=("epochs", "checkpoint_every"))
         if (
             not self.seeds
@@ -133,7 +136,7 @@ def preset(
     """
     if algo not in ALGORITHMS:
         raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
-    if isinstance(seeds, bool | float):
+    if isinstance(seeds, bool | str) or not isinstance(seeds, Iterable | int | np.integer):
         raise TypeError(f"seeds is how many (10), or which ((3, 7)); got {seeds!r}")
     if isinstance(seeds, int | np.integer):
         if seeds < 1:

@@ -128,7 +128,7 @@ class Collector:
         action_mode: ActionMode = "clip",
         acting: CompiledActing | None = None,
     ) -> None:
-        check_environments(envs, len(streams))
+        check_environments(envs, len(streams), action_mode)
         self.envs, self.networks, self.policy = envs, networks, networks.policy
         self.streams, self.action_mode, self._acting = streams, action_mode, acting
         self._act, self._judge = networks.actor.act, networks.critic.act

@@ -19,19 +19,17 @@ import contextlib
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import gymnasium
 import numpy as np
-import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from numpy.typing import NDArray
 from torch import Tensor
 
 from inbounds import robots
-from inbounds.distributions.boxes import require_box
 from inbounds.headless import naming_the_backend
 from inbounds.learning.config import ALGORITHMS, TrainConfig
 from inbounds.learning.families.policy import Policy
@@ -42,6 +40,7 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import held
+from inbounds.learning.threads import one_thread
 from inbounds.learning.updates.engine import compiled_engine
 from inbounds.robots.registration import TASK_NAMES
 
@@ -80,7 +79,6 @@ class Trainer:
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
         check_environments(self.envs, num_seeds, config.action_mode)
         box: Any = self.envs.single_action_space
-        require_box(box)
         policy = Policy(config.policy, box.low, box.high)
         self._compiled = compiled_engine(policy.family) if config.engine == "compiled" else None
         obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
@@ -160,6 +158,11 @@ class Trainer:
                 )
         self.diverged |= now
         return told
+
+    @property
+    def checkpoint_due(self) -> bool:
+        """Whether `train` keeps a checkpoint after the epoch that is done: every so many, and at the end."""
+        return self.finished or len(self.records) % self.config.checkpoint_every == 0
 
     @property
     def finished(self) -> bool:
@@ -276,7 +279,7 @@ def train(
             checkpoint.require_keepable(trainer.state_dict())
         while not trainer.finished:
             record = trainer.epoch()
-            if path is not None and (len(trainer.records) % config.checkpoint_every == 0 or trainer.finished):
+            if path is not None and trainer.checkpoint_due:
                 checkpoint.save(path, trainer.state_dict())
             if callback is not None:
                 callback(trainer, record)
@@ -303,8 +306,9 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
             config.algorithm, horizon=max(2, config.algorithm.minibatch_size), num_epochs=1
         )
         trainer = Trainer(dataclasses.replace(config, seeds=config.seeds[:1], algorithm=short), make_envs)
-        trainer.epoch()
-        trainer.envs.close()
+        with contextlib.closing(trainer.envs), warnings.catch_warnings():
+            warnings.simplefilter("ignore", DivergedSeedWarning)  # the run itself will speak of its own seeds
+            trainer.epoch()
     return time.perf_counter() - start
 
 
@@ -333,17 +337,3 @@ def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
         "episodes": np.array([len(r) for r in returns]),
         "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
     }
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Run torch on one thread: its matrices are small here, and results then do not depend on the machine's cores.
-
-    Two processes of one thread each do more in a given time than one process of two.
-    """
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -43,6 +43,10 @@ class Camera:
     distance: float | None = None
     """From the camera to the robot's centre of mass [m]; None: as near as shows the whole robot."""
 
+    def __post_init__(self) -> None:
+        if self.distance is not None and not self.distance > 0:
+            raise ValueError(f"a camera's distance must be positive, or None, got {self.distance}")
+
 
 @dataclass(frozen=True)
 class Film:
@@ -152,7 +156,8 @@ class RobotRenderer:
         view.type = mujoco.mjtCamera.mjCAMERA_FREE
         view.azimuth, view.elevation = camera.azimuth, camera.elevation
         half_field = math.radians(self._model.vis.global_.fovy) / 2
-        view.distance = camera.distance or 1.1 * self._radius / math.sin(half_field)
+        near = 1.1 * self._radius / math.sin(half_field)
+        view.distance = near if camera.distance is None else camera.distance
         return view
 
     def _look_at(self, centre: NDArray[np.float64]) -> None:

@@ -5,7 +5,7 @@ is the first of the new episode, the last of the old one is in `info["final_obs"
 in the *next* step, would put a transition into every rollout in which the action has no effect.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral
 from typing import Any, Literal
 
@@ -135,6 +135,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             if seeds[robot] is not None:
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         where = self._start(chosen)
+        messages.raise_pending()
         assert self._obs is not None
         return self._obs.copy(), masked(only(chosen, where), chosen)
 
@@ -160,7 +161,6 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         executed = self._executed(actions)
         task.ctrl[:] = executed
         self._batch.step(nstep=task.frame_skip)
-        messages.raise_pending()
         task.feel_contacts()
 
         position = task.position()
@@ -178,6 +178,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             info["y_velocity"] = velocity[:, 1]
         over = terminated | truncated
         infos = self._restart(over, info) if over.any() else masked(info, self._everyone)
+        messages.raise_pending()  # the step is whole, whatever becomes of it
         return self._obs.copy(), reward, terminated, truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -293,7 +294,6 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         for robot in robots:
             self.task.qpos[robot], self.task.qvel[robot] = self.task.draw_start(self._generators[robot])
         self._batch.forward(robots)
-        messages.raise_pending()
         self.task.forget_contacts(robots)
         self._elapsed[robots] = 0
         self._position[robots] = self.task.position()[robots]
@@ -328,7 +328,7 @@ def _seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int |
     """Return a seed for each robot; None goes on with the generator that is there."""
     if isinstance(seed, int | np.integer):
         return [int(seed) + i for i in range(num_envs)]
-    each = [None] * num_envs if seed is None else list(seed)
+    each = [None] * num_envs if seed is None else list(seed) if isinstance(seed, Iterable) else []
     if len(each) != num_envs or not all(s is None or isinstance(s, int | np.integer) for s in each):
         raise ValueError(f"Pass one seed for each of the {num_envs} robots, or one integer; got {seed!r}")
     return [None if s is None else int(s) for s in each]

@@ -141,8 +141,7 @@ class Cell:
     @property
     def id(self) -> str:
         """Names the cell and its files: unique in the study, sorted by arm and robot."""
-        parts = (self.arm, self.robot.lower(), self.algorithm, self.family, self.variant)
-        return "-".join(part for part in parts if part)
+        return cell_id(self.arm, self.algorithm, self.family, self.robot, self.variant)
 
     @property
     def kept_seeds(self) -> tuple[int, ...]:
@@ -179,6 +178,16 @@ class Cell:
     def digest(self) -> str:
         """SHA-256 of the study's version and of every value that decides the cell's results."""
         return digest_of(self.config, self.version)
+
+
+def cell_id(arm: str, algorithm: str, family: str, robot: str, variant: str = "") -> str:
+    """Return the name of a cell and of its files.
+
+    Example:
+        >>> cell_id("standard", "ppo", "beta", "Hopper")
+        'standard-hopper-ppo-beta'
+    """
+    return "-".join(part for part in (arm, robot.lower(), algorithm, family, variant) if part)
 
 
 def digest_of(config: TrainConfig, version: int = STUDY_VERSION) -> str:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from inbounds.learning.storage.whole_files import damaged
 from inbounds.study import store
+from inbounds.study.cell import cell_id
 from inbounds.study.grid import ARMS, Cell, study_cells
 from inbounds.study.running import file_checks
 from inbounds.study.statistics import carry_forward
@@ -55,8 +56,7 @@ class Column(NamedTuple):
             >>> Column("standard", "ppo", "beta").cell_id("Hopper")
             'standard-hopper-ppo-beta'
         """
-        parts = (self.arm, robot.lower(), self.algorithm, self.family, self.variant)
-        return "-".join(part for part in parts if part)
+        return cell_id(self.arm, self.algorithm, self.family, robot, self.variant)
 
     @property
     def baseline(self) -> Column:

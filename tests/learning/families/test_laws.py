@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,10 +154,18 @@ def test_latent_ratios_are_action_ratios() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"log_std_min": 1.0, "log_std_max": 0.0}, {"concentration_max": 1.0}], ids=str
+    "wrong",
+    [
+        {"log_std_min": 1.0, "log_std_max": 0.0},
+        {"concentration_max": 1.0},
+        {"concentration_max": np.inf},
+        {"concentration_max": None},
+        {"log_std_min": "x"},
+    ],
+    ids=str,
 )
-def test_limits_are_checked(wrong: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="must"):
+def test_limits_are_checked(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must"):
         Limits(**wrong)
 
 

@@ -148,7 +148,7 @@ def test_state_independent_std_is_one_number_that_learns() -> None:
 
 def test_named_tensors_rebuild_the_network() -> None:
     nets = actor_critic(PolicyConfig("gaussian"))
-    tensors = nets.named_tensors()
+    tensors = nets.actor.named_tensors("policy") | nets.critic.named_tensors("value")
     assert set(tensors) == {
         f"{n}.{i}.{k}" for n in ("policy", "value") for i in (0, 1) for k in ("weight", "bias")
     }

@@ -262,6 +262,18 @@ def test_another_configuration_in_the_policies_file_is_damage(tmp_path: Path) ->
     assert load_policies(path)[0].config.env == "point-v2"
 
 
+@pytest.mark.parametrize(("old", "new"), [(b'"dtype":"F32"', b'"dtype":"I32"'), (b"[2,4,3]", b"[2,3,4]")])
+def test_another_type_or_shape_in_the_policies_file_is_damage(tmp_path: Path, old: bytes, new: bytes) -> None:
+    path = tmp_path / "policies.safetensors"
+    config = small_config(seeds=2, dtype="float32", hidden=(4,))
+    save_policies(path, small_run(config))
+    written = path.read_bytes()
+    assert old in written
+    path.write_bytes(written.replace(old, new, 1))
+    with pytest.raises(DamagedFileError, match="its checksum is wrong"):
+        load_policies(path)
+
+
 @pytest.mark.parametrize("normalised", [True, False])
 def test_an_observation_beyond_single_precision(normalised: bool) -> None:
     """Normalised, it is clipped as any large one; as it is, it would become infinite."""

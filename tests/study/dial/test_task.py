@@ -94,6 +94,15 @@ def test_information_of_a_beta_is_the_curvature_of_its_divergence() -> None:
         assert 2 * divergence / h**2 == pytest.approx(full[k, k], rel=2e-3)
 
 
+def test_seeds_are_gymnasiums() -> None:
+    task = DialTask(0.5, dims=3)
+    each, counted = DialEnv(task, 3), DialEnv(task, 3)
+    first, _ = counted.reset(seed=4)
+    np.testing.assert_array_equal(each.reset(seed=[4, 5, 6])[0], first)
+    with pytest.raises(ValueError, match="3 environments need 3 seeds, got 2"):
+        each.reset(seed=[1, 2])
+
+
 def test_environments_keep_to_themselves_and_pass_the_collectors_check() -> None:
     task = DialTask(0.5, dims=3)
     alone, both = DialEnv(task, 1), DialEnv(task, 2)

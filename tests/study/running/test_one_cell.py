@@ -17,7 +17,7 @@ import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import load_policies
-from inbounds.learning.training import one_thread
+from inbounds.learning.threads import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, read_cell, run_cell
 from inbounds.study.running import evaluate, file_checks, one_cell
 from inbounds.study.running.cell_lock import CellLock, ClaimedError
@@ -245,13 +245,16 @@ def test_a_damaged_checkpoint_does_not_take_the_place_of_the_good_one(
     assert first_mismatch(whole, rows_of(folder)) == ""
 
 
-def test_two_damaged_checkpoints_are_for_the_user(tmp_path: Path) -> None:
+def test_two_damaged_checkpoints_are_for_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = folder_in(tmp_path)
     run_cell(small_cell(), folder, stop=stop_after(24))
     for path in folder.work.glob("**/checkpoint.pt"):
         path.write_bytes(b"nothing")
+    closed = []
+    monkeypatch.setattr(MeasuredTrainer, "close", lambda self: closed.append(True))
     with pytest.raises(StudyError, match=r"damaged.* and .*damaged.*delete .* to start the cell anew"):
         run_cell(small_cell(), folder)
+    assert closed == [True]
 
 
 def test_the_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:

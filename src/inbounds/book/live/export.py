@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.seeding import SeedStreams
+from inbounds.learning.threads import one_thread
 from inbounds.robots.messages import install_handler
 from inbounds.robots.tasks import Task
 from inbounds.robots.vector_env import TASKS
@@ -143,13 +144,14 @@ def policies(cell: Cell, folder: StudyFolder) -> Iterator[tuple[str, dict[str, A
         )
 
 
-def starts(cell: Cell) -> Iterator[tuple[str, str]]:
+def starts(cell: Cell, study: StudyFolder | None = None) -> Iterator[tuple[str, str]]:
     """Yield the networks with which a cell's training began, under the name of their file.
 
     A seed draws the same first weights for every algorithm and family of a robot, so they are stored once.
 
     Args:
         cell: of the robot.
+        study: the folder of its policies; None is the one that the project ships.
 
     Example:
         >>> from inbounds.study.grid import select
@@ -161,13 +163,15 @@ def starts(cell: Cell) -> Iterator[tuple[str, str]]:
     model: mujoco.MjModel = TASKS[config.env].load_model()
     low, high = model.actuator_ctrlrange.astype(np.float32).T
     streams = [SeedStreams.of(seed).initialization for seed in config.seeds]
-    nets = ActorCritic(Policy(config.policy, low, high), _obs_dim(cell), config.network, streams)
+    with one_thread():  # as a run does: the last bit of an orthogonal matrix depends on it
+        policy, obs_dim = Policy(config.policy, low, high), _obs_dim(cell, study or StudyFolder.shipped())
+        nets = ActorCritic(policy, obs_dim, config.network, streams)
     for i, seed in enumerate(config.seeds):
         yield f"{cell.robot.lower()}-{seed}", packed(nets.actor.theta[i].numpy())
 
 
-def _obs_dim(cell: Cell) -> int:
-    tensors = safetensors.numpy.load_file(StudyFolder.shipped().policy_files(cell)[0])
+def _obs_dim(cell: Cell, study: StudyFolder) -> int:
+    tensors = safetensors.numpy.load_file(study.policy_files(cell)[0])
     return int(tensors["normalizer.mean"].shape[1])
 
 
@@ -211,7 +215,7 @@ def write(target: Path, folder: StudyFolder | None = None) -> int:
             )
         if cell.robot not in seen:
             seen.add(cell.robot)
-            for key, text in starts(cell):
+            for key, text in starts(cell, folder):
                 total += (target / "starts" / f"{key}.js").write_text(
                     script("starts", key, text), encoding="utf8"
                 )

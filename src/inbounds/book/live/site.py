@@ -5,6 +5,7 @@ python -m inbounds.book.live.site FOLDER
 
 from __future__ import annotations
 
+import argparse
 import json
 import shutil
 import sys
@@ -100,7 +101,11 @@ def licence_of(package: str) -> str:
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(
+        description="Write the live robot's scripts, robots and policies into a folder."
+    )
+    parser.add_argument("folder", type=Path, help="made where it is missing; what it held is replaced")
+    folder = parser.parse_args().folder
     if folder.exists() and any(folder.iterdir()) and not (folder / "status.js").is_file():
         sys.exit(f"{folder} has something else in it, which would be deleted: name a new folder")
     if why := write(folder):

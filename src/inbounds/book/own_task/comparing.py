@@ -16,6 +16,7 @@ reset.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inbounds.learning import TrainedPolicy
 from inbounds.study.statistics import Estimate, bootstrap
+from inbounds.study.statistics.settings import MANY_RESAMPLES
 
 __all__ = ["best_of", "compare", "constant", "greedy", "noisy", "play"]
 
@@ -31,7 +33,6 @@ Floats: TypeAlias = NDArray[np.float64]
 Actor: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
 MakeEnvs: TypeAlias = Callable[[int], VectorEnv[Any, Any, Any]]
 """Makes a vector environment for a number of episodes at once."""
-RESAMPLES = 100_000
 
 
 def constant(action: ArrayLike) -> Actor:
@@ -84,15 +85,15 @@ def play(act: Actor, make_envs: MakeEnvs, days: Sequence[int], limit: int = 100_
         >>> play(constant([0.0]), envs, [0, 1])
         array([0., 0.])
     """
-    envs = make_envs(len(days))
-    obs, _ = envs.reset(seed=list(days))  # type: ignore[arg-type]  # every vector environment takes a list
     earned, running = np.zeros(len(days)), np.ones(len(days), np.bool_)
-    for _ in range(limit):
-        obs, reward, terminated, truncated, _ = envs.step(act(obs))
-        earned += np.where(running, reward, 0.0)
-        running &= ~(terminated | truncated)
-        if not running.any():
-            return earned
+    with closing(make_envs(len(days))) as envs:
+        obs, _ = envs.reset(seed=list(days))  # type: ignore[arg-type]  # every vector environment takes a list
+        for _ in range(limit):
+            obs, reward, terminated, truncated, _ = envs.step(act(obs))
+            earned += np.where(running, reward, 0.0)
+            running &= ~(terminated | truncated)
+            if not running.any():
+                return earned
     raise RuntimeError(
         f"after {limit} steps {running.sum()} of {len(days)} episodes go on: no end, no return"
     )
@@ -152,7 +153,7 @@ def compare(
 
     def over(values: Floats) -> Estimate:
         each = values.mean(1) if values.ndim == 2 else values
-        return bootstrap(each, rng, statistic="mean", resamples=RESAMPLES)
+        return bootstrap(each, rng, statistic="mean", resamples=MANY_RESAMPLES)
 
     found: dict[str, tuple[Estimate, Estimate | None]] = {}
     for name, values in returns.items():

@@ -17,11 +17,9 @@ from inbounds.book.drawing import figures
 from inbounds.learning import TrainedPolicy
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import bootstrap, mean_of, minus
+from inbounds.study.statistics.settings import CURVE_RESAMPLES
 
 __all__ = ["draw", "final_policies", "mean_of", "minus"]
-
-BAND_RESAMPLES = 1000
-"""Of a curve's band, which nobody reads to the last digit."""
 
 
 def draw(ax: Any, family: str, values: ArrayLike, x: ArrayLike | None = None, **changed: Any) -> None:
@@ -44,7 +42,7 @@ def draw(ax: Any, family: str, values: ArrayLike, x: ArrayLike | None = None, **
     """
     values = np.asarray(values, np.float64)
     places = np.array([1, *range(10, 10 * values.shape[1], 10)]) if x is None else np.asarray(x)
-    found = bootstrap(values, np.random.default_rng(0), statistic="mean", resamples=BAND_RESAMPLES)
+    found = bootstrap(values, np.random.default_rng(0), statistic="mean", resamples=CURVE_RESAMPLES)
     look = figures.family_style(family) | changed
     ax.fill_between(places, found.low, found.high, alpha=0.18, color=look["color"])
     ax.plot(places, found.value, **look)

@@ -21,16 +21,15 @@ from inbounds.book import verdicts
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
-from inbounds.study import StudyFolder, analysis, statistics
-from inbounds.study.cell import ROBOTS, SECOND_VERSION
+from inbounds.study import StudyFolder, analysis
+from inbounds.study.cell import ROBOTS
 from inbounds.study.grid import FREE, all_cells
 from inbounds.study.outcomes import Column, Outcomes
-from inbounds.study.second.pooled import pooled_scores
+from inbounds.study.second.primary import pooled_difference
 from inbounds.study.statistics import Estimate
 
 __all__ = ["DETAILS", "Detail", "Effect", "effect_table", "effects", "not_measured", "tally_of"]
 
-RESAMPLES = 100_000
 FAMILIES = ("gaussian", "clipped-gaussian", "beta", "logit-normal")
 Pairs = tuple[tuple[Column, Column], ...]
 
@@ -206,16 +205,7 @@ def _effects_of(outcomes: Outcomes, name: str) -> Iterator[Effect]:
                         yield Effect(name, robot, LOOKS[family].label, change)
     for pair in detail.pairs:
         for robot in ROBOTS:
-            change = _between(outcomes, *pair, robot)
+            change = pooled_difference(outcomes, *pair, robot, "final")
             if change:
                 free = " with a free σ" if FREE in (pair[0].variant, pair[1].variant) else ""
                 yield Effect(name, robot, LOOKS[pair[0].family].label + free, change)
-
-
-def _between(outcomes: Outcomes, first: Column, second: Column, robot: str) -> Estimate | None:
-    """Return the difference of two columns of the second study, the interval that its pages show."""
-    a, b = (pooled_scores(outcomes, column, robot, "final") for column in (first, second))
-    if a is None or b is None:
-        return None
-    rng = analysis.generator_for("gap", *first, *second, robot, "final", False, version=SECOND_VERSION)
-    return statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")

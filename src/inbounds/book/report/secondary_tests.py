@@ -14,7 +14,7 @@ from inbounds.book.report.equal_start import with_second
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name, graded
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.second import SecondaryRow, secondary
+from inbounds.study.second import PAIRS, Pair, compared, pooled_difference, secondary
 from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import p_value, spoken, verdict
@@ -57,12 +57,12 @@ def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "fi
 
     Args:
         outcomes: of either study.
-        question: a key of `inbounds.study.second.secondary.PAIRS`.
+        question: a key of `inbounds.study.second.PAIRS`.
         family: of the first side.
         endpoint: final or area.
     """
-    rows = _asked(outcomes, [(question, family)], endpoint)
-    return by_robot([(row.robot, _graded(row.comparison)) for row in rows])
+    rows = _asked(outcomes, question, family, endpoint)
+    return by_robot([(robot, _graded(comparison)) for robot, comparison in rows.items()])
 
 
 def difference(
@@ -77,33 +77,39 @@ def difference(
         robot: whose cells are finished on both sides.
         endpoint: final or area.
     """
-    (found,) = (row for row in _asked(outcomes, [(question, family)], endpoint) if row.robot == robot)
-    assert found.comparison.difference is not None  # `_asked` leaves such rows out
-    return found.comparison.difference
+    pair = _pair(question, family)
+    found = pooled_difference(with_second(outcomes), pair.first, pair.second, robot, endpoint)
+    assert found is not None, robot
+    return found
 
 
-def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str = "final") -> tuple[int, int]:
-    """Return how many findings stay were all secondary tests corrected together, and how many there are.
+def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]]) -> tuple[int, int]:
+    """Return how many findings of final return stay, all secondary tests corrected together, of how many.
 
     Args:
         outcomes: of either study.
         asked: question and family of each comparison, as for `verdicts`.
-        endpoint: final or area.
     """
-    rows = _asked(outcomes, asked, endpoint)
-    found = [row for row in rows if _verdict(row.comparison) in ("higher", "lower")]
-    return sum(row.p_over_everything < SIGNIFICANCE for row in found), len(found)
-
-
-def _asked(outcomes: Outcomes, asked: Iterable[tuple[str, str]], endpoint: str) -> list[SecondaryRow]:
-    """Return what is finished of comparisons, robot by robot."""
-    wanted = {(question, family, endpoint) for question, family in asked}
-    return [
+    wanted = {(question, family, "final") for question, family in asked}
+    found = [
         row
         for row in secondary(with_second(outcomes))
         if (row.question, row.pair.first.family, row.endpoint) in wanted
         and row.comparison.difference is not None
+        and _verdict(row.comparison) in ("higher", "lower")
     ]
+    return sum(row.p_over_everything < SIGNIFICANCE for row in found), len(found)
+
+
+def _pair(question: str, family: str) -> Pair:
+    (found,) = (pair for pair in PAIRS[question] if pair.first.family == family)
+    return found
+
+
+def _asked(outcomes: Outcomes, question: str, family: str, endpoint: str) -> dict[str, Comparison]:
+    """Return what is finished of a question that is put to a family once, by robot."""
+    found = compared(with_second(outcomes), _pair(question, family), endpoint)
+    return {robot: comparison for robot, comparison in found.items() if comparison.difference is not None}
 
 
 def _graded(comparison: Comparison) -> str:

@@ -23,6 +23,7 @@ from inbounds.book.report.words import change_name
 from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.statistics import Estimate, difference
+from inbounds.study.statistics.settings import MANY_RESAMPLES
 
 BOUNDED: Mapping[str, str] = {"beta": "Beta", "logit-normal": "logit-normal"}
 """Families with three centres, and their names within a label."""
@@ -30,8 +31,6 @@ NAMES: Mapping[str, str] = {"gaussian": "Gaussian", "clipped-gaussian": "CAPG", 
 """All families, likewise."""
 WAYS: Mapping[str, str] = {"mean": "mean", "mode": "mode", "sample": "noise kept"}
 """What is compared with the median, and its panel's title."""
-RESAMPLES = 100_000
-"""Enough that the generator's luck does not move an interval's end across zero."""
 _ROW_HEIGHT = 0.24  # inches
 
 
@@ -111,7 +110,7 @@ def gain(returns: NDArray[np.float64], median: NDArray[np.float64]) -> Estimate:
     unit = np.nanmean(np.abs(median)) / 100
     generator = np.random.default_rng(0)
     options: dict[str, Any] = {"statistic": "mean", "paired": True, "missing": "exclude"}
-    return difference(returns / unit, median / unit, generator, resamples=RESAMPLES, **options)
+    return difference(returns / unit, median / unit, generator, resamples=MANY_RESAMPLES, **options)
 
 
 @dataclass(frozen=True)

@@ -127,17 +127,17 @@ def _run(notebook: Path, report: Path, seconds: float, gigabytes: float) -> str:
     except subprocess.TimeoutExpired:
         return f"not reached within {seconds:g} s (--seconds)"
     finally:
-        if process.poll() is None:
-            _end(process)
+        _end(process)
     if process.returncode:
         return f"not reached: the notebook's process ended with code {process.returncode} (out of memory? --gigabytes)"
     return "not reached: the grader's cell raised an error, or shows something else"
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process with all that it started."""
+    """End a process, and all that it started, which may have outlived it."""
     if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):  # nothing is left of its group
+            os.killpg(process.pid, signal.SIGKILL)
     else:
         process.kill()
     process.wait()

@@ -131,7 +131,7 @@ def beta_median(parameters: BetaParameters) -> Tensor:
 
 def beta_head_bias(std: float, limits: Limits) -> tuple[float, float]:
     """Return the pre-activations of α = β with sd² = 1/(2α + 1)."""
-    excess = (1 / std**2 - 1) / 2 - 1  # α − 1
+    excess = max((1 / std**2 - 1) / 2 - 1, math.ulp(1.0))  # α − 1, which rounds to 0 beside the widest law
     pre_activation = excess + math.log(-math.expm1(-excess))  # softplus⁻¹
     return pre_activation, pre_activation
 
@@ -140,7 +140,6 @@ FAMILY = Family(
     name="beta",
     law=BETA,
     to_unit=lambda latent, xp: 2 * latent - 1,
-    entropy_name="differential entropy of the unit action",
     entropy=beta_entropy,
     greedy={
         "mean": lambda p: scaled_beta(p).mean,

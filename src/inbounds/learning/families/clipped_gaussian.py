@@ -51,7 +51,6 @@ FAMILY = Family(
     name="clipped-gaussian",
     law=CLIPPED_NORMAL,
     to_unit=lambda latent, xp: clip(latent, -1.0, 1.0),
-    entropy_name="entropy of the mixed law of the clipped unit action",
     entropy=lambda p: clipped_normal(p).entropy().sum(-1),
     greedy={
         "mean": lambda p: clipped_normal(p).mean,

@@ -10,8 +10,10 @@ a call on a handful of numbers costs a third as much.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from types import ModuleType
 from typing import Any, Protocol, Self, TypeAlias, TypeVar
 
@@ -79,7 +81,9 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("log_std_min", "log_std_max", "concentration_max"):
             # Beside a number of NumPy's, which has a precision, float32 actions would be computed in float64.
-            object.__setattr__(self, name, float(getattr(self, name)))
+            if not isinstance(value := getattr(self, name), Real) or not math.isfinite(value):
+                raise ValueError(f"{name} must be a finite number, got {value!r}")
+            object.__setattr__(self, name, float(value))
         if not max(abs(self.log_std_min), abs(self.log_std_max)) < 88:
             raise ValueError(
                 "log_std_min and log_std_max must lie within ±88, where single precision has a σ, got "
@@ -127,7 +131,6 @@ class Family:
         name: under which `PolicyConfig` knows it.
         law: of the latent.
         to_unit: the map from latents `[..., A]` to unit actions; called with the latents and `xp`.
-        entropy_name: which entropy `entropy` is, in words.
         entropy: of parameters `[..., A]`, summed over A: `[...]`, in nats.
         greedy: ways to act without noise, by name: parameters `[..., A]` to unit actions `[..., A]`.
         distribution: of the action, elementwise: parameters `[..., A]` and the box's low and high `[A]`.
@@ -140,7 +143,6 @@ class Family:
     name: str
     law: Law[Any]
     to_unit: Callable[[Array, ModuleType], Array]
-    entropy_name: str
     entropy: Callable[[Any], Tensor]
     greedy: Mapping[str, Callable[[Any], Tensor]]
     distribution: Callable[[Any, Tensor, Tensor], Distribution]

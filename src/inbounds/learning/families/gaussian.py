@@ -143,7 +143,6 @@ FAMILY = Family(
     name="gaussian",
     law=NORMAL,
     to_unit=lambda latent, xp: latent,
-    entropy_name="differential entropy of the unclipped Normal",
     entropy=normal_entropy,
     greedy={name: lambda p: p.loc for name in ("mean", "median", "mode")},
     distribution=lambda p, low, high: Normal(*in_box(p, low, high)),

@@ -99,7 +99,6 @@ FAMILY = Family(
     name="logit-normal",
     law=NORMAL,
     to_unit=lambda latent, xp: xp.tanh(latent / 2),
-    entropy_name="differential entropy of the unit action",
     entropy=logit_normal_entropy,
     greedy={
         "mean": lambda p: logit_normal(p).mean,

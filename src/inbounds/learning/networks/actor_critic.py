@@ -152,10 +152,6 @@ class ActorCritic:
         """Return, for each seed, whether all its weights are finite: `[S]` booleans."""
         return torch.isfinite(self.actor.theta).all(1) & torch.isfinite(self.critic.theta).all(1)
 
-    def named_tensors(self) -> dict[str, Tensor]:
-        """Return all weights by name, `[S, ...]` each, for export."""
-        return self.actor.named_tensors("policy") | self.critic.named_tensors("value")
-
     def state_dict(self) -> dict[str, Any]:
         """Return the weights."""
         return {"actor": self.actor.theta.clone(), "critic": self.critic.theta.clone()}

@@ -57,7 +57,7 @@ class AdamNumbers(NamedTuple):
 
 
 @kernel
-def rational_tanh(x: Any) -> Any:
+def rational_tanh(x: Any) -> None:
     """Replace x by tanh x in float32: x P(x²)/Q(x²), a least-squares fit; within 4e-7. NaN stays NaN."""
     number = x.dtype.type
     one, top = number(1), number(_SATURATED)

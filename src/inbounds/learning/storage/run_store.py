@@ -181,7 +181,8 @@ def save_policies(path: str | Path, trainer: Run, seeds: Sequence[int] | None = 
         rows = [config.seeds.index(seed) for seed in seeds]
         config = dataclasses.replace(config, seeds=tuple(seeds))
         tensors = {n: t if n in OF_THE_BOX else t[rows] for n, t in tensors.items()}
-    metadata = metadata_of(config, sha256=_digest(tensors), sha256_config=_digest_of(describe(config)))
+    digests = {"sha256_config": _digest_of(describe(config)), "sha256_layout": _digest_of(_layout(tensors))}
+    metadata = metadata_of(config, sha256=_digest(tensors), **digests)
     write_whole(Path(path), safetensors.numpy.save(tensors, {METADATA_KEY: metadata}))
 
 
@@ -215,11 +216,9 @@ def load_policies(run: str | Path, remedy: str = "") -> list[TrainedPolicy]:
         if says_nothing_of_the_file(error):
             raise
         raise damaged(path, error, remedy) from error
-    of_config = metadata.get("sha256_config")  # older files have none
-    if metadata.get("sha256") != _digest(tensors) or of_config not in (
-        None,
-        _digest_of(metadata.get("config")),
-    ):
+    described = {"sha256_config": metadata.get("config"), "sha256_layout": _layout(tensors)}
+    right = all(metadata.get(name) in (None, _digest_of(it)) for name, it in described.items())  # older: none
+    if metadata.get("sha256") != _digest(tensors) or not right:
         raise damaged(path, "its checksum is wrong", remedy)
     return policies_from(config_from(metadata), tensors)
 
@@ -260,6 +259,11 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
 
 def _digest_of(config: Any) -> str:
     return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()
+
+
+def _layout(tensors: Mapping[str, NDArray[Any]]) -> dict[str, list[Any]]:
+    """Return type and shape of each tensor, which its bytes do not tell."""
+    return {name: [str(each.dtype), *each.shape] for name, each in tensors.items()}
 
 
 def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:

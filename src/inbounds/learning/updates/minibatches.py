@@ -1,4 +1,4 @@
-"""Shuffling a rollout into minibatches, each seed in its own order, and fitting the value network on them."""
+"""Shuffling a rollout into minibatches, each seed in its own order."""
 
 from __future__ import annotations
 

@@ -122,9 +122,16 @@ class DialEnv(VectorEnv[Any, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """Show the first signs `[S, A]`; seeds, if any, are one integer per environment."""
-        if isinstance(seed, Sequence):
-            self._generators = [np.random.default_rng(one) for one in seed]
+        """Show the first signs `[S, A]`; an integer seeds environment i with `seed + i`, a list each with its own.
+
+        Raises:
+            ValueError: there are not as many seeds as environments.
+        """
+        if seed is not None:
+            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"{self.num_envs} environments need {self.num_envs} seeds, got {len(seeds)}")
+            self._generators = [np.random.default_rng(one) for one in seeds]
         self._draw()
         return self._signs[0].copy(), {}
 

@@ -12,13 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from inbounds.study import analysis, statistics
+from inbounds.study import analysis, statistics, words
 from inbounds.study.analysis import Contrast, generator_for
 from inbounds.study.grid import ROBOTS, Cell, select
 from inbounds.study.ledger.verdicts import Evidence, State, Statement
 from inbounds.study.outcomes import Column, Floats, Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate, combination
-from inbounds.study.words import verdict
 
 MARGIN = 0.1
 """The smallest difference that matters, as a share of what PPO × gaussian of arm 1 learns on the robot."""
@@ -40,9 +39,8 @@ def groups_of(outcomes: Outcomes, places: Sequence[tuple[Column, str]], endpoint
 
 def side(estimate: Estimate, sign: int = 1, edge: float = 0.0) -> State:
     """Say on which side of an edge an interval lies, for a claim that it is above (sign 1) or below (−1)."""
-    if sign * (float(estimate.low if sign > 0 else estimate.high) - edge) > 0:
-        return "for"
-    return "against" if sign * (float(estimate.high if sign > 0 else estimate.low) - edge) < 0 else "open"
+    states: dict[int, State] = {1: "for", 0: "open", -1: "against"}
+    return states[sign * words.side(estimate.low, estimate.high, edge)]
 
 
 def beats(
@@ -98,8 +96,8 @@ def _of_comparison(about: str, row: Comparison, sign: int, best: float) -> State
     said: Mapping[str, State] = (
         {"higher": "for", "lower": "against"} if sign > 0 else {"higher": "against", "lower": "for"}
     )
-    state = said.get(verdict(row), "open")
-    later = said.get(verdict(replace(row, p_adjusted=best)), "open")
+    state = said.get(words.verdict(row), "open")
+    later = said.get(words.verdict(replace(row, p_adjusted=best)), "open")
     return Statement(
         about, state, row.difference, row.p_adjusted, may_become=() if later == state else (later,)
     )

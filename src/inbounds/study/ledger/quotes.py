@@ -8,6 +8,7 @@ strongly, and under the conditions, as it is meant. All other rows count in a ta
 
 from __future__ import annotations
 
+import argparse
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -201,7 +202,9 @@ def not_in(text: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    lacking = not_in(Path(sys.argv[1]).read_text(encoding="utf8"))
+    parser = argparse.ArgumentParser(description="Look for every quotation in the text of the thesis.")
+    parser.add_argument("text", type=Path, help="the thesis as plain text")
+    lacking = not_in(parser.parse_args().text.read_text(encoding="utf8"))
     print(
         "\n".join(f"not in the text: {name}" for name in lacking) or f"all {len(ALL)} quotes are in the text"
     )

@@ -8,6 +8,7 @@ never updated. A run that is evaluated is, bit for bit, the run that is not.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import torch
 from numpy.typing import NDArray
 
 from inbounds.learning import Trainer
-from inbounds.learning.training import Environments, make_environments, one_thread
+from inbounds.learning.threads import one_thread
+from inbounds.learning.training import Environments, make_environments
 
 _STREAM = 4  # spawn keys below it are training's
 FINAL = 2**31
@@ -140,17 +142,22 @@ def evaluate_finally(trainer: Trainer, episodes: int = FINAL_EPISODES) -> list[d
     Returns:
         A row per seed, way and episode: `seed`, `greedy`, `episode`, `return`, `length`.
     """
-    seeds, players = trainer.config.seeds, Players(trainer, episodes)
+    seeds, rows = trainer.config.seeds, []
     starts = [
         int(start) for seed in seeds for start in generator_of(seed, FINAL).integers(2**31, size=episodes)
     ]
-    rows = []
-    for way in (*trainer.networks.policy.family.greedy, "sample"):
-        returns, lengths = players.play(way, starts, [generator_of(seed, FINAL + 1) for seed in seeds])
-        rows += [
-            {"seed": seed, "greedy": way, "episode": e, "return": returns[s, e], "length": int(lengths[s, e])}
-            for s, seed in enumerate(seeds)
-            for e in range(episodes)
-        ]
-    players.close()
+    with closing(Players(trainer, episodes)) as players:
+        for way in (*trainer.networks.policy.family.greedy, "sample"):
+            returns, lengths = players.play(way, starts, [generator_of(seed, FINAL + 1) for seed in seeds])
+            rows += [
+                {
+                    "seed": seed,
+                    "greedy": way,
+                    "episode": e,
+                    "return": returns[s, e],
+                    "length": int(lengths[s, e]),
+                }
+                for s, seed in enumerate(seeds)
+                for e in range(episodes)
+            ]
     return rows

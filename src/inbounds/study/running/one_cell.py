@@ -115,9 +115,12 @@ class _CellRun:
         self.cell, self.folder, self.claim = cell, folder, claim
         self.work = folder.work_of(cell)
         self.run_ = MeasuredTrainer(cell)
-        self._restore()
-        self.kept = self.run_.done
-        self._begin_session()
+        with contextlib.ExitStack() as undone:
+            undone.callback(self.run_.close)
+            self._restore()
+            self.kept = self.run_.done
+            self._begin_session()
+            undone.pop_all()
         self._clock = time.perf_counter()
 
     def _begin_session(self) -> None:

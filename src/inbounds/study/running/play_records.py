@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -131,11 +132,10 @@ def records_of(cell: Cell, folder: StudyFolder) -> list[dict[str, Any]]:
         >>> len(rows), rows[0]["record"], rows[0]["wrong"]
         (60, 'latent, float32', 0.0)
     """
-    players = _Recorder(run_with_policies(cell, folder))
     seeds = cell.kept_seeds
     starts = [int(final_starts(seed)[0]) for seed in seeds]
-    _, lengths = players.play("sample", starts, [generator_of(seed, FINAL + 1) for seed in seeds])
-    players.close()
+    with closing(_Recorder(run_with_policies(cell, folder))) as players:
+        _, lengths = players.play("sample", starts, [generator_of(seed, FINAL + 1) for seed in seeds])
     latents = np.stack(players.latents, 1).astype(np.float64)  # [S, T, A]
     laws = [np.stack(each, 1).astype(np.float64) for each in zip(*players.laws, strict=True)]
     rows = []
@@ -168,7 +168,11 @@ def publish_records(cells: Sequence[Cell], folder: StudyFolder) -> bool:
     Returns:
         Whether anything had to be done.
     """
-    mine = [c for c in cells if c.family == "logit-normal" and folder.policy_files(c)[0].is_file()]
+    mine = [
+        c
+        for c in cells
+        if c.family == "logit-normal" and c.keeps_policies and folder.policy_files(c)[0].is_file()
+    ]
     path = records_file(folder)
     kept, policies = [], {}
     if path.is_file():

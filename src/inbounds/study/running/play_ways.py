@@ -7,8 +7,10 @@ not all of a cell's policies are kept: a batch of another size rounds otherwise)
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -103,12 +105,14 @@ def final_starts(seed: int) -> NDArray[Any]:
     return generator_of(seed, FINAL).integers(2**31, size=max(EPISODES.values()))
 
 
-def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
+def run_with_policies(cell: Cell, folder: StudyFolder, *, count: int = 1, **changes: Any) -> Trainer:
     """Return a run of a cell's kept seeds in which the shipped policies stand; its values and its past are not theirs.
 
     Args:
         cell: which keeps its policies.
         folder: where they are.
+        count: observations that their statistics count for: how little new ones move them.
+        changes: of the cell's configuration, such as `engine="autograd"`.
 
     Raises:
         FileNotFoundError: they are not there.
@@ -116,14 +120,17 @@ def run_with_policies(cell: Cell, folder: StudyFolder) -> Trainer:
     """
     folder.load_policies(cell)  # looks at the checksum
     tensors = safetensors.numpy.load_file(folder.policy_files(cell)[0])
-    trainer = Trainer(cell.kept_config)
+    trainer = Trainer(dataclasses.replace(cell.kept_config, **changes))
     with torch.no_grad():
         for i, layer in enumerate(trainer.networks.actor.layers):
             layer.weight[:] = torch.from_numpy(tensors[f"policy.{i}.weight"])
             layer.bias[:, :, 0] = torch.from_numpy(tensors[f"policy.{i}.bias"])
     if (normalizer := trainer.collector.normalizer) is not None:
-        normalizer.count = 1  # a variance is a mean of squares already
-        normalizer.mean[:], normalizer.squares[:] = tensors["normalizer.mean"], tensors["normalizer.variance"]
+        normalizer.count = count
+        normalizer.mean[:], normalizer.squares[:] = (
+            tensors["normalizer.mean"],
+            tensors["normalizer.variance"] * count,
+        )
     trainer.diverged[:] = tensors["diverged"]
     return trainer
 
@@ -143,11 +150,8 @@ def play_cell(cell: Cell, folder: StudyFolder, ways: Sequence[str] | None = None
         >>> len(rows), rows[0]["at_bounds"]
         (100, 1.0)
     """
-    players = WatchedPlayers(run_with_policies(cell, folder), EPISODES[cell.robot])
-    try:
+    with closing(WatchedPlayers(run_with_policies(cell, folder), EPISODES[cell.robot])) as players:
         return [row for way in (ways_of(cell.family) if ways is None else ways) for row in players.rows(way)]
-    finally:
-        players.close()
 
 
 def evaluate_cells(
@@ -192,9 +196,9 @@ def evaluate_cells(
 def _publish_nothing(folder: StudyFolder) -> None:
     rows: list[Row] = []
     for robot in ROBOTS:
-        players = WatchedPlayers(Trainer(Cell("standard", "ppo", "gaussian", robot).config), EPISODES[robot])
-        rows += [{"robot": robot} | row for row in players.rows(NOTHING)]
-        players.close()
+        trainer = Trainer(Cell("standard", "ppo", "gaussian", robot).config)
+        with closing(WatchedPlayers(trainer, EPISODES[robot])) as players:
+            rows += [{"robot": robot} | row for row in players.rows(NOTHING)]
     kinds = nothing_schema()
     about = {"study_version": STUDY_VERSION, "id": NOTHING, "config": {}, "session": provenance()}
     table = pa.Table.from_pylist([{name: row[name] for name in kinds.names} for row in rows], kinds)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -184,10 +185,9 @@ def check_rerun(cell: Cell, folder: StudyFolder, epochs: int) -> Checked:
         return Checked(cell.id, False, said)
     rows, metadata = store.read_cell(path), store.read_metadata(path)
     epochs = min(epochs, cell.epochs)
-    run = MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))
-    for _ in range(epochs):
-        run.epoch()
-    run.close()
+    with closing(MeasuredTrainer(dataclasses.replace(cell, epochs=epochs))) as run:
+        for _ in range(epochs):
+            run.epoch()
     here, there = provenance(), metadata["sessions"][0]
     if not same_arithmetic(here, there, cell.engine):
         return _compare_first_rewards(cell.id, run.progress.first_rewards, metadata)

@@ -5,8 +5,16 @@ rows = primary(outcomes)
 """
 
 from inbounds.study.second.over_robots import aggregate, improvement
-from inbounds.study.second.primary import GAUSSIAN, PrimaryRow, primary
-from inbounds.study.second.secondary import PAIRS, SecondaryRow, engines_agree, secondary, starts
+from inbounds.study.second.primary import GAUSSIAN, PrimaryRow, pooled_difference, primary
+from inbounds.study.second.secondary import (
+    PAIRS,
+    Pair,
+    SecondaryRow,
+    compared,
+    engines_agree,
+    secondary,
+    starts,
+)
 from inbounds.study.second.yardsticks import BEST, DO_NOTHING, MARGINS, normalized
 
 __all__ = [
@@ -15,12 +23,15 @@ __all__ = [
     "GAUSSIAN",
     "MARGINS",
     "PAIRS",
+    "Pair",
     "PrimaryRow",
     "SecondaryRow",
     "aggregate",
+    "compared",
     "engines_agree",
     "improvement",
     "normalized",
+    "pooled_difference",
     "primary",
     "secondary",
     "starts",

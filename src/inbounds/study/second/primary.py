@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from inbounds.study import statistics
 from inbounds.study.analysis import generator_for, marked
 from inbounds.study.cell import ROBOTS, SECOND_VERSION
 from inbounds.study.grid import FREE
-from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.outcomes import Column, Floats, Outcomes
 from inbounds.study.second.pooled import is_whole, pooled, pooled_scores
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Estimate
@@ -112,24 +114,49 @@ def gap(
     A test of which a seed is still to be run has an estimate and no p-value: in a correction it keeps its place, like
     one whose cells are missing.
     """
+    place = (outcomes, first, second, robot, endpoint)
+    if (found := _both(*place, without_diverged=without_diverged)) is None:
+        return Gap(None, float("nan"))
+    estimate, sides, rng = found
+    whole = all(is_whole(outcomes, column, robot) for column in (first, second))
+    p_value = (
+        statistics.permutation_test(*sides, rng, permutations=PERMUTATIONS, missing="exclude")
+        if whole
+        else float("nan")
+    )
+    return Gap(estimate, p_value)
+
+
+def pooled_difference(
+    outcomes: Outcomes, first: Column, second: Column, robot: str, endpoint: str
+) -> Estimate | None:
+    """Return the difference of `gap` without its test, which takes most of the time; None where a cell is missing."""
+    found = _both(outcomes, first, second, robot, endpoint)
+    return None if found is None else found[0]
+
+
+def _both(
+    outcomes: Outcomes,
+    first: Column,
+    second: Column,
+    robot: str,
+    endpoint: str,
+    *,
+    without_diverged: bool = False,
+) -> tuple[Estimate, tuple[Floats, Floats], np.random.Generator] | None:
+    """Return a difference, the seeds' scores of both sides, and the generator that has drawn its resamples."""
     a, b = (
         pooled_scores(outcomes, column, robot, endpoint, without_diverged=without_diverged)
         for column in (first, second)
     )
     if a is None or b is None:
-        return Gap(None, float("nan"))
+        return None
     rng = generator_for("gap", *first, *second, robot, endpoint, without_diverged, version=SECOND_VERSION)
     estimate = statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")
-    whole = all(is_whole(outcomes, column, robot) for column in (first, second))
-    p_value = (
-        statistics.permutation_test(a, b, rng, permutations=PERMUTATIONS, missing="exclude")
-        if whole
-        else float("nan")
-    )
     if not without_diverged:
         cells = [cell for column in (first, second) for cell in pooled(outcomes, column, robot)]
         estimate = marked(estimate, *cells)
-    return Gap(estimate, p_value)
+    return estimate, (a, b), rng
 
 
 def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[PrimaryRow]:

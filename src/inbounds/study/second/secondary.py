@@ -17,7 +17,7 @@ from inbounds.study.analysis import scores
 from inbounds.study.cell import ROBOTS
 from inbounds.study.grid import FREE
 from inbounds.study.outcomes import Column, Outcomes
-from inbounds.study.second.primary import Gap, gap
+from inbounds.study.second.primary import gap
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Comparison, Equivalence
 
@@ -100,6 +100,29 @@ class SecondaryRow:
     """The same after Holm over every secondary test."""
 
 
+def compared(outcomes: Outcomes, pair: Pair, endpoint: str) -> dict[str, Comparison]:
+    """Return the tests of one pair, robot by robot, with Holm's correction over them.
+
+    Args:
+        outcomes: of the second study, as far as it has come.
+        pair: what is compared.
+        endpoint: final or area.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from inbounds.study import StudyFolder
+        >>> nothing = Outcomes.read(StudyFolder(Path("no/results")))
+        >>> compared(nothing, PAIRS["other step sizes"][0], "final")["Hopper"].difference is None
+        True
+    """
+    gaps = [gap(outcomes, pair.first, pair.second, robot, endpoint) for robot in pair.robots]
+    adjusted = statistics.holm([each.p_value for each in gaps])
+    return {
+        robot: Comparison(each.difference, each.p_value, float(p))
+        for robot, each, p in zip(pair.robots, gaps, adjusted, strict=True)
+    }
+
+
 def secondary(outcomes: Outcomes) -> list[SecondaryRow]:
     """Return every secondary test, those of missing cells included.
 
@@ -113,23 +136,15 @@ def secondary(outcomes: Outcomes) -> list[SecondaryRow]:
         >>> len(rows), {row.comparison.difference for row in rows}
         (196, {None})
     """
-    found: list[tuple[str, Pair, str, str, Gap, float]] = []
-    for question, pairs in PAIRS.items():
-        for pair in pairs:
-            for endpoint in ENDPOINTS:
-                gaps = [gap(outcomes, pair.first, pair.second, robot, endpoint) for robot in pair.robots]
-                adjusted = statistics.holm([each.p_value for each in gaps])
-                found += [
-                    (question, pair, endpoint, robot, each, float(p))
-                    for robot, each, p in zip(pair.robots, gaps, adjusted, strict=True)
-                ]
-    everything = statistics.holm([each.p_value for *_, each, _ in found])
-    return [
-        SecondaryRow(
-            question, pair, endpoint, robot, Comparison(each.difference, each.p_value, p), float(over)
-        )
-        for (question, pair, endpoint, robot, each, p), over in zip(found, everything, strict=True)
+    found = [
+        (question, pair, endpoint, robot, comparison)
+        for question, pairs in PAIRS.items()
+        for pair in pairs
+        for endpoint in ENDPOINTS
+        for robot, comparison in compared(outcomes, pair, endpoint).items()
     ]
+    everything = statistics.holm([comparison.p_value for *_, comparison in found])
+    return [SecondaryRow(*row, float(over)) for row, over in zip(found, everything, strict=True)]
 
 
 def starts(outcomes: Outcomes, column: Column, robot: str) -> dict[str, float] | None:
