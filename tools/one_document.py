@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 STYLE = Path(__file__).with_name("print.css")
 NOT_ON_PAPER = (
     "script, .headerlink, .copybtn, .prev-next-footer, .toggle-button, .inbounds-live, .inbounds-explorable style, "
-    ".inbounds-kind-switch, noscript > iframe, button"
+    "noscript > iframe, button"
 )
 POINTERS = ("for", "aria-labelledby", "aria-describedby", "aria-controls")
 FRAMES = 3

@@ -7,7 +7,7 @@ neither side lacks anything.
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -58,7 +58,7 @@ class Entry:
 
 def equations(notebooks: Path) -> Iterator[Equation]:
     """Yield the labelled equations of the chapters, in the book's order."""
-    for path in sorted(notebooks.glob("*.ipynb")):
+    for path in statements.in_order(notebooks):
         last = None  # the statement whose proof may follow
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.cell_type == "markdown":
@@ -114,11 +114,15 @@ def row(*cells: str) -> Iterator[str]:
 
 
 def to_code(
-    numbered: list[Equation], proved: list[statements.Statement], known: dict[str, Entry]
+    numbered: list[Equation],
+    proved: list[statements.Statement],
+    known: dict[str, Entry],
+    order: Iterable[str],
 ) -> Iterator[str]:
-    """Yield the first half of the page: a table per chapter, equations first, then statements with code."""
-    for chapter in sorted({e.chapter for e in numbered} | {s.chapter for s in proved if s.label in known}):
-        yield from ("", f"**Chapter {{doc}}`../notebooks/{chapter}`**", "")
+    """Yield the first half of the page: a table per chapter, in order, equations first, then statements with code."""
+    wanted = {e.chapter for e in numbered} | {s.chapter for s in proved if s.label in known}
+    for chapter in (name for name in order if name in wanted):
+        yield from ("", f"**{{doc}}`../notebooks/{chapter}`**", "")
         yield from (":::{list-table}", ":header-rows: 1", ":widths: 34 33 33", "")
         yield from row("Equation", "Code", "Checked by")
         for equation in (e for e in numbered if e.chapter == chapter):
@@ -154,7 +158,8 @@ class CodeAndEquations(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Parse the generated Markdown in place."""
         root = Path(self.env.srcdir)
-        for path in (root / "book" / "equations.toml", *sorted((root / "notebooks").glob("*.ipynb"))):
+        pages = statements.in_order(root / "notebooks")
+        for path in (root / "_toc.yml", root / "book" / "equations.toml", *pages):
             self.env.note_dependency(str(path))
         in_book = set(self.env.found_docs)
         numbered = [e for e in equations(root / "notebooks") if f"notebooks/{e.chapter}" in in_book]
@@ -165,7 +170,10 @@ class CodeAndEquations(SphinxDirective):
                 f"name the code of {', '.join(unlisted)} in book/equations.toml, or why there is none"
             )
         order = [found.label for found in (*numbered, *proved)]
-        looked_for = {"code": to_code(numbered, proved, known), "equations": to_equations(known, order)}
+        looked_for = {
+            "code": to_code(numbered, proved, known, (path.stem for path in pages)),
+            "equations": to_equations(known, order),
+        }
         container = nodes.container()
         lines = StringList(list(looked_for[self.arguments[0]]), source="code-and-equations")
         self.state.nested_parse(lines, self.content_offset, container)

@@ -16,6 +16,8 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from inbounds.book.pages.contents import Contents, contents
+
 PROVED = ("theorem", "proposition", "lemma", "corollary")
 PROOF_DIRECTIVE = re.compile(r"\{prf:(\w+)\}[ \t]*(.*)\n:label:[ \t]*(\S+)")
 
@@ -37,9 +39,17 @@ class Statement:
     chapter: str
 
 
+def in_order(notebooks: Path) -> list[Path]:
+    """Return the notebooks of a folder in the order of the table of contents beside it; others follow, by name."""
+    toc = notebooks.parent / "_toc.yml"
+    known = contents(toc) if toc.is_file() else Contents((), ())
+    places = {name: i for i, name in enumerate((*known.core, *known.depth))}
+    return sorted(notebooks.glob("*.ipynb"), key=lambda path: (places.get(path.stem, len(places)), path.stem))
+
+
 def statements(notebooks: Path) -> Iterator[Statement]:
     """Yield what the chapters prove, in the book's order."""
-    for path in sorted(notebooks.glob("*.ipynb")):
+    for path in in_order(notebooks):
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.cell_type == "markdown":
                 for kind, title, label in PROOF_DIRECTIVE.findall(cell.source):
@@ -58,7 +68,7 @@ def page(found: list[Statement], tests: dict[str, list[str]]) -> Iterator[str]:
     for statement in found:
         if statement.chapter != chapter:
             chapter = statement.chapter
-            yield from ("", f"**Chapter {{doc}}`../notebooks/{chapter}`**", "")
+            yield from ("", f"**{{doc}}`../notebooks/{chapter}`**", "")
         yield f"::::{{dropdown}} {statement.kind.capitalize()}: {statement.title}"
         yield from (f"{{prf:ref}}`{statement.label}`", "")
         for test in tests[statement.label]:
@@ -76,7 +86,7 @@ class StatementTests(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Parse the generated Markdown in place."""
         root = Path(self.env.srcdir)
-        for path in (root / "book" / "statements.toml", *sorted((root / "notebooks").glob("*.ipynb"))):
+        for path in (root / "_toc.yml", root / "book" / "statements.toml", *in_order(root / "notebooks")):
             self.env.note_dependency(str(path))
         in_book = set(self.env.found_docs)
         found = [s for s in statements(root / "notebooks") if f"notebooks/{s.chapter}" in in_book]

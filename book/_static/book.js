@@ -1,4 +1,4 @@
-/* What the theme leaves to do once a page is laid out: breaks in formulas, and a keyboard for what scrolls. */
+/* What the theme leaves to do once a page is laid out: the two layers, folds, formulas, films, keyboard, buttons. */
 (() => {
   "use strict";
 

@@ -103,6 +103,33 @@ def test_an_equation_knows_the_statement_it_stands_in(extension, tmp_path) -> No
     assert found == {"eq-inside": "thm-a", "eq-outside": None, "eq-proof": "thm-a"}
 
 
+def test_chapters_come_in_the_books_order(extension, tmp_path) -> None:
+    import nbformat
+
+    (tmp_path / "notebooks").mkdir()
+    for name in ("beta", "gamma", "alpha", "elsewhere"):
+        cells = [
+            nbformat.v4.new_markdown_cell(f"$$ y = 2 $$ (eq-{name})\n\n{CHAPTER.replace('-', f'-{name}-')}")
+        ]
+        nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "notebooks" / f"{name}.ipynb")
+    core, depth = (
+        "  - {file: notebooks/gamma}\n  - {file: notebooks/alpha}\n",
+        "  - {file: notebooks/beta}\n",
+    )
+    parts = f"- numbered: 2\n  chapters:\n{core}- caption: Going deeper\n  chapters:\n{depth}"
+    (tmp_path / "_toc.yml").write_text(f"root: index\nparts:\n{parts}")
+    order = ["gamma", "alpha", "beta", "elsewhere"]
+    found = list(extension.equations(tmp_path / "notebooks"))
+    assert list(dict.fromkeys(e.chapter for e in found)) == order
+    known = {e.label: extension.Entry(says="it") for e in found}
+    lines = "\n".join(extension.to_code(found, [], known, order))
+    assert [lines.index(f"notebooks/{name}`") for name in order] == sorted(
+        lines.index(f"notebooks/{name}`") for name in order
+    )
+    stated = extension.statements.statements(tmp_path / "notebooks")
+    assert [s.chapter for s in stated if s.kind == "theorem"] == order
+
+
 def test_the_page_goes_both_ways(extension) -> None:
     known = {
         "eq-a": extension.Entry(
@@ -113,7 +140,7 @@ def test_the_page_goes_both_ways(extension) -> None:
     }
     numbered = [extension.Equation("eq-a", "01_x", "thm-c"), extension.Equation("eq-b", "01_x", None)]
     proved = [extension.statements.Statement("theorem", "Title", "thm-c", "01_x")]
-    lines = list(extension.to_code(numbered, proved, known))
+    lines = list(extension.to_code(numbered, proved, known, ["00_w", "01_x"]))
     start = lines.index("* - {eq}`eq-a` a density")
     assert lines[start + 1 : start + 3] == [
         "  - {py:obj}`p.f <p.f>`",

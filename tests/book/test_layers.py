@@ -84,9 +84,8 @@ def test_figures_are_numbered_and_captioned_in_order(layers: ModuleType) -> None
 def test_figures_that_come_as_html_are_counted_with_the_others(layers: ModuleType) -> None:
     document = new_document("page")
     alt = 'Bars of "both" laws & their intervals.'
-    one_shape = study_html.figure(plt.figure(), alt, "All from one study.")
-    two_shapes = study_html.figure_of(lambda narrow: plt.figure(), alt, "All from one study.")
-    document += nodes.raw("", one_shape + two_shapes, format="html")
+    figure = study_html.figure_of(lambda narrow: plt.figure(), alt, "All from one study.")
+    document += nodes.raw("", figure + figure, format="html")
     document += nodes.container(
         "", nodes.image(uri="a.png", alt="Two bars, of one height.", classes=["inbounds-figure"])
     )

@@ -2,8 +2,11 @@
 
 * `contents` — core chapters and the pages of *Going deeper*, from the table of contents.
 * `programs` — the program of a chapter as one file, and what the chapter changed in it; `blocks` — its parts.
-* `cells` — what a stored notebook holds.
+* `cells` — what a stored notebook holds; `glue` — the numbers that a page takes from another.
 * `counts` — words, visible lines of code, statements and intervals of a page.
+* `plans` — the plans of *Teach it* and the courses; `graded` — which exercises a grader marks.
+* `citing` — how to cite the book, and how to clone it.
 
-Only the tools, the tests and the book's extension read this; it loads nothing but the standard library and YAML.
+The book's extension, the tools, the tests and `inbounds grade` read this, and the pages that show a program; it loads
+nothing but the standard library and YAML.
 """

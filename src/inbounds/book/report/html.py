@@ -122,16 +122,6 @@ def progress(parts: Mapping[str, tuple[int, int]]) -> str:
     return str(_HTML.progress(parts))
 
 
-def figure(fig: Figure, alt: str, caption: str = "") -> str:
-    """Return a figure with its alt text, and close it.
-
-    Raises:
-        ValueError: the alt text says less than a sentence would.
-    """
-    png, width = last_picture(fig, alt)
-    return str(_HTML.figure(png, width, alt, together(caption)))
-
-
 def figure_of(draw: Callable[[bool], Figure], alt: str, caption: str = "") -> str:
     """Return a figure that a page of a phone's width shows in another shape: panels below each other.
 
