@@ -6,6 +6,7 @@ the document. Scripts go, but for the one that sets formulas; folds are open; a 
 
 import base64
 import html
+import posixpath
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -166,13 +167,7 @@ def resolved(name: str, address: str) -> str:
         >>> resolved("notebooks/ppo", "../book/notation.html")
         'book/notation'
     """
-    parts = list(PurePosixPath(name).parent.parts)
-    for part in PurePosixPath(address).parts:
-        if part == "..":
-            parts = parts[:-1]
-        else:
-            parts.append(part)
-    return "/".join(parts).removesuffix(".html")
+    return posixpath.normpath(posixpath.join(posixpath.dirname(name), address)).removesuffix(".html")
 
 
 def title_page() -> str:

@@ -10,6 +10,7 @@
 
 import html
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -35,8 +36,13 @@ GUESSED_BASE = """<script>
 
 def shorten(text: str) -> str:
     """Return a text on one line, cut behind a word where it is too long."""
-    words = " ".join(text.split())
-    return words if len(words) <= LONGEST else words[: LONGEST - 1].rpartition(" ")[0].rstrip(",;:") + "…"
+    words = textwrap.shorten(text, LONGEST, placeholder="…")
+    return words if words == " ".join(text.split()) else words.removesuffix("…").rstrip(",;:") + "…"
+
+
+def is_plain(paragraph: nodes.paragraph) -> bool:
+    """Return whether a paragraph has no formula, and nothing that could not be read."""
+    return not any(paragraph.findall(lambda node: isinstance(node, nodes.math | nodes.problematic)))
 
 
 def first_words(doctree: nodes.document | None) -> str:
@@ -44,9 +50,8 @@ def first_words(doctree: nodes.document | None) -> str:
     if doctree is None:
         return ""
     for paragraph in doctree.findall(nodes.paragraph):
-        plain = not any(paragraph.findall(lambda node: isinstance(node, nodes.math | nodes.problematic)))
         in_text = isinstance(paragraph.parent, nodes.section | nodes.document)
-        if plain and in_text and paragraph.astext().strip():
+        if is_plain(paragraph) and in_text and paragraph.astext().strip():
             return paragraph.astext()
     return ""
 

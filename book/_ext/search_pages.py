@@ -5,10 +5,12 @@ book that is read from the disk, too. ``book/_static/search.js`` puts the pages 
 """
 
 import json
+import textwrap
 import tomllib
 from pathlib import Path
 from typing import Any
 
+import metadata
 from docutils import nodes
 from sphinx.application import Sphinx
 
@@ -17,12 +19,6 @@ from inbounds.book.pages.contents import contents
 LONGEST = 220  # characters of a passage
 PARTS = "search"  # folder beside the doctrees: a page that is not written again keeps what it said
 SCRIPT = "search_pages.js"
-
-
-def cut(text: str) -> str:
-    """Return a text on one line, cut behind a word where it is too long."""
-    words = " ".join(text.split())
-    return words if len(words) <= LONGEST else words[:LONGEST].rpartition(" ")[0] + " …"
 
 
 def passage(section: nodes.Element) -> str:
@@ -34,13 +30,10 @@ def passage(section: nodes.Element) -> str:
             around = around.parent
         return around is section
 
-    def plain(paragraph: nodes.paragraph) -> bool:
-        return not any(paragraph.findall(lambda node: isinstance(node, nodes.math | nodes.problematic)))
-
-    found = [each for each in section.findall(nodes.paragraph) if own(each) and plain(each)]
+    found = [each for each in section.findall(nodes.paragraph) if own(each) and metadata.is_plain(each)]
     long = [each for each in found if len(each.astext()) > 40]
     in_text = [each for each in long if each.parent is section]
-    return cut((in_text or long)[0].astext()) if long else ""
+    return textwrap.shorten((in_text or long)[0].astext(), LONGEST, placeholder=" …") if long else ""
 
 
 def sections(doctree: nodes.document) -> list[tuple[str, str, str]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
+
+from inbounds.book.pages.cells import read_cells
 
 _CALL = re.compile(r"\bgraders\.(\w+)\(")
 _SHOWN = re.compile(r"^graders\.(\w+)\(", re.M)
@@ -45,11 +46,10 @@ def graders_of(notebook: Path) -> dict[str, list[str]]:
     """
     found: dict[str, list[str]] = {}
     label = ""
-    for cell in json.loads(notebook.read_text(encoding="utf8"))["cells"]:
-        source = "".join(cell["source"])
+    for cell in read_cells(notebook):
         if cell["cell_type"] == "markdown":
-            for label in _START.findall(source):
+            for label in _START.findall(cell["source"]):
                 found[label] = []
         elif label:
-            found[label] += graders_in(source)
+            found[label] += graders_in(cell["source"])
     return found

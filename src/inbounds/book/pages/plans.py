@@ -5,12 +5,13 @@ The page for lecturers (`book/teaching.md`) shows what is read here at build, so
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+
+from inbounds.book.pages.cells import read_cells
 
 COURSE = (
     "actions_have_bounds",
@@ -84,8 +85,7 @@ def plan_of(notebook: Path) -> Plan:
         >>> plan.minutes("short"), plan.minutes("long")
         (50, 90)
     """
-    cells = json.loads(notebook.read_text(encoding="utf8"))["cells"]
-    prose = "\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    prose = "\n\n".join(cell["source"] for cell in read_cells(notebook) if cell["cell_type"] == "markdown")
     fold = _FOLD.search(prose)
     lines = fold[2].splitlines() if fold else []
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
