@@ -104,6 +104,9 @@ def test_any_value_can_be_overridden() -> None:
         action_mode="raw",
     )
     assert command.run_dir() == Path("runs/Hopper-v5-logit-normal-ppo-as-printed")
+    own = options.parse(["train", "my_module:Arm-v0"])
+    assert isinstance(own, options.Train)
+    assert own.run_dir() == Path("runs/my_module-Arm-v0-logit-normal-ppo")
 
 
 @settings(deadline=None, max_examples=50)

@@ -101,9 +101,11 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     with TrainingProgress(3, console) as progress:
         for _ in range(3):
             progress(trainer, trainer.epoch())
+        progress.say_stopping()
     text = console.export_text()
     console.file.close()
     assert "epoch 3/3  return" in text
+    assert "stopping after this epoch; Ctrl-C again: at once" in text
     assert "━━━" in text
 
 

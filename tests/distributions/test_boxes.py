@@ -46,6 +46,11 @@ CASES = {
 }
 
 
+def test_a_box_of_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one component"):
+        require_box(spaces.Box(-1.0, 1.0, (0,), np.float32))
+
+
 @pytest.mark.parametrize(("space", "box", "rule"), CASES.values(), ids=CASES)
 def test_the_remedy_that_a_refusal_names_works(
     space: spaces.Space, box: spaces.Box | None, rule: str

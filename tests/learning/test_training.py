@@ -508,6 +508,13 @@ def test_names_and_numbers_are_what_presets_take(wrong: dict[str, Any]) -> None:
         TrainConfig(**wrong)
 
 
+def test_what_a_run_is_made_of_is_asked_for_by_name() -> None:
+    with pytest.raises(TypeError, match=r"such as preset\(\.\.\.\) gives, got 'Hopper-v5'"):
+        train("Hopper-v5")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="make_envs is a function of the number of seeds"):
+        train(small_config(), make_envs=PointEnv(3))  # type: ignore[arg-type]
+
+
 def test_networks_can_be_pickled() -> None:
     trainer = Trainer(small_config(epochs=1), PointEnv)
     copied = pickle.loads(pickle.dumps(trainer.networks))

@@ -86,6 +86,7 @@ def dial(args: Sequence[str]) -> int:
     Example:
         >>> dial(["status", "--results", "no/results", "--work", "no/work"])
         0 of 100 cells are finished, the map is not written
+        no folder no/results here: the source tree has one with the map (--results)
         0
     """
     read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
@@ -126,6 +127,8 @@ def _do(command: DialCommand, console: Console) -> int:
             say(f"the map is written; of its {len(cells)} cells, {finished} lie in {folder.work}")
         else:
             say(f"{finished} of {len(cells)} cells are finished, the map is not written")
+            if not folder.results.is_dir():
+                say(f"no folder {folder.results} here: the source tree has one with the map (--results)")
     elif isinstance(command, Show):
         _show(DialOutcomes(folder.read()), say)
     else:

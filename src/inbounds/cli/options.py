@@ -110,7 +110,8 @@ class PolicyOptions(PolicyConfig):
     """The family and how network outputs become its parameters."""
 
     family: Annotated[FamilyName, arg(name="policy", prefix_name=False)] = "logit-normal"
-    """The policy family: which law the latent has, and which map makes it an action."""
+    """The policy family: which law the latent has, and which map makes it an action. The default is the book's subject;
+    what the book advises is on its page *Which policy?*."""
 
 
 @dataclass(frozen=True)
@@ -118,12 +119,13 @@ class Train(TrainConfig):
     """Train a policy, all seeds at once; go on with the run if its directory exists.
 
     The directory keeps curves.parquet (one row per epoch and seed), policies.safetensors (for `inbounds watch` and
-    `inbounds.learning.load_policy`) and checkpoint.pt (to go on from).
+    `inbounds.learning.load_policy`) and checkpoint.pt (to go on from). Ctrl-C stops after the epoch under way and keeps
+    everything; a second one stops at once.
     """
 
     env: Annotated[Positional[str], arg(metavar="ENV")] = "HalfCheetah-v5"
     """Hopper-v5, Walker2d-v5, HalfCheetah-v5, Ant-v5, Humanoid-v5 or Swimmer-v5, or any id that `gymnasium.make` knows
-    and that has a bounded, one-dimensional Box of actions."""
+    and that has a bounded, one-dimensional Box of actions. Its observations are a Box, which is flattened."""
     seeds: Annotated[tuple[int, ...], _SEEDS] = tuple(range(10))
     """Trained in lockstep; none notices the others. How many (10), or which (0,7 or 10-19)."""
     policy: PolicyOptions = field(default_factory=PolicyOptions)
@@ -144,13 +146,16 @@ class Train(TrainConfig):
 
     def run_dir(self) -> Path:
         """Return the run directory, the default one if none is named."""
-        name = f"{self.env.replace('/', '-')}-{self.policy.family}-{self.algo}"
+        name = f"{self.env.replace('/', '-').replace(':', '-')}-{self.policy.family}-{self.algo}"
         return self.out or Path("runs") / (name + ("-as-printed" if self.preset == "as-printed" else ""))
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Film a trained policy, off screen, as an MP4 file, and print its return."""
+    """Film a trained policy in a robot of MuJoCo, off screen, as an MP4 file, and print its return.
+
+    In any other environment `inbounds.learning.load_policy(run).act(obs)` acts.
+    """
 
     run: Annotated[Positional[Path], arg(metavar="RUN")]
     """Run directory, or the file policies.safetensors of one."""

@@ -91,9 +91,14 @@ class TrainingProgress:
             nobody = "nobody reads the output any more", 141
             self.unread = nobody if is_unread(error) else ("the output's disk is full", 1)
 
+    def say_stopping(self) -> None:
+        """Add to the line above the bar, in answer to Ctrl-C, when the run will stop; safe in a signal's handler."""
+        self._line.append("  stopping after this epoch; Ctrl-C again: at once", style="bold")
+
     def _picture(self, text: str, done: int) -> Group:
         """Return the numbers, and a bar below them that is as wide as the terminal."""
-        return Group(Text(text), ProgressBar(total=self.epochs, completed=done))
+        self._line = Text(text)
+        return Group(self._line, ProgressBar(total=self.epochs, completed=done))
 
     def _remember_returns(self, trainer: Trainer) -> None:
         """Take in the returns of the last epoch; at first, of all epochs that a resumed run has behind it."""

@@ -224,9 +224,9 @@ def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
         for cell in cells:
             console.print(f"{cell.id}: {cell_status(cell, command.folder())}", markup=False, soft_wrap=True)
     else:
-        console.print(status_table(cells, command.folder()))
-        if not command.results.is_dir():
+        if not command.results.is_dir():  # a cell may be under way all the same
             console.print(_no_folder(command.results), markup=False, soft_wrap=True)
+        console.print(status_table(cells, command.folder()))
     return 0
 
 

@@ -8,7 +8,7 @@ import difflib
 import errno
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -44,16 +44,19 @@ class Stop:
 
     def __init__(self) -> None:
         self.signal: signal.Signals | None = None
+        self._say: Callable[[], None] = lambda: None
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Take a signal."""
         if self.signal is not None:
             raise KeyboardInterrupt
         self.signal = signal.Signals(number)
+        self._say()
 
     @contextlib.contextmanager
-    def listening(self) -> Iterator[None]:
-        """Take Ctrl-C, what job schedulers send, and a closed terminal as such signals."""
+    def listening(self, say: Callable[[], None]) -> Iterator[None]:
+        """Take Ctrl-C, what job schedulers send, and a closed terminal as such signals; `say` that one has come."""
+        self._say = say
         numbers = [signal.SIGINT, signal.SIGTERM]
         if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as under nohup
             numbers.append(signal.SIGHUP)
@@ -133,7 +136,7 @@ class _Session:
                 anew = "" if goes_on else f"; {config.env} cannot save its state, so new episodes begin"
                 progress.say(f"going on with {self.run_dir}, {_epochs(start)} done{anew}")
             try:
-                with self.stop.listening():
+                with self.stop.listening(progress.say_stopping):
                     trainer = train(
                         config,
                         run_dir=self.folder,

@@ -50,6 +50,11 @@ def _remedy(space: Any) -> tuple[str, str] | None:
     if len(space.shape) != 1:
         made = wrapped.format(f"lambda action: action.reshape({space.shape})", "the same Box, flattened")
         return "be a one-dimensional Box", f"wrap the environment in {made}"
+    if not space.shape[0]:
+        return (
+            "be a Box with at least one component",
+            "there is nothing to decide: check what the environment declares",
+        )
     if not space.is_bounded():
         made = wrapped.format("lambda action: action", "a bounded one")
         return "have finite bounds", f"choose some, and wrap the environment in {made}"

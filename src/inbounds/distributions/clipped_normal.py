@@ -254,7 +254,9 @@ class _Parts(NamedTuple):
 
 @register_kl(ClippedNormal, ClippedNormal)
 def _kl_clipped_normal_clipped_normal(p: ClippedNormal, q: ClippedNormal) -> Tensor:
-    """Return KL(p‖q) of the mixed laws, in nats, elementwise and exact.
+    """Return KL(p‖q) of the mixed laws, in nats, elementwise and in closed form.
+
+    Its rounding grows with (σ_p/width)²: in float64 some 1e-12 at 50 widths, 1e-7 at 5000.
 
     Σ_bounds P log(P/Q) + ∫ p log(p/q): with r = σ_p/σ_q and d = (μ_p − μ_q)/σ_q the integral is
     −M₀ log r + ½[(r² − 1) M₂ + 2rd M₁ + d² M₀].

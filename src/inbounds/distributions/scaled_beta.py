@@ -42,7 +42,12 @@ class ScaledBeta(SigmoidMapped):
     raises under validation and has log-density −inf without, a sample is never on a bound. The *mode* may be:
     a density with a concentration below one grows towards its bound, where no value attains the maximum.
 
-    No `cdf`, `icdf` and `median`: torch has no incomplete beta function.
+    No `cdf`, `icdf` and `median`: torch has no incomplete beta function. (`scipy.special.betaincinv` has them, without
+    gradients; a policy's greedy median comes from there.)
+
+    **Accuracy.** Entropy, log-density and KL divergence are differences of numbers as large as the concentrations: in
+    float64 their absolute error is about 1e-16 times α + β times its logarithm, 1e-11 at 10⁴ and 1e-4 at 10¹⁰. The
+    divergence of two nearly equal laws may come out as far below zero.
 
     Args:
         concentration1: `[...]` α, positive; weight towards high.
@@ -140,7 +145,7 @@ class ScaledBeta(SigmoidMapped):
 
         Each log G is log Gamma(α + 1) + log(U)/α with U uniform (Marsaglia & Tsang 2000, for α < 1): it stays finite
         for α down to 1e-36 in single precision. Differentiable once in the concentrations (implicitly, through torch's
-        Gamma sampler).
+        Gamma sampler), with finite gradients for α from 1e-10 on.
         """
         shape = self._extended_shape(torch.Size(sample_shape))
         return _rsample_log_gamma(self.concentration1.expand(shape), generator) - _rsample_log_gamma(

@@ -110,6 +110,8 @@ class LogitNormalPolicy(ActorCriticPolicy):
         **options: as the peer's; `log_std_init` is the log σ of the *latent*: 0 executes a standard deviation of
             0.42 of half the range. Generalised state-dependent exploration (`use_sde`) is not for it.
 
+    The entropy, which the peer asks for in every minibatch, is an integral: training takes longer than `MlpPolicy`'s.
+
     Raises:
         ValueError: another action space (the message names the wrapper that makes this one of it), or `use_sde`.
 

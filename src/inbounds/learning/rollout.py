@@ -339,7 +339,8 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: Act
     if (reset := envs.metadata.get("autoreset_mode")) != AutoresetMode.SAME_STEP:
         raise ValueError(
             f"the environments reset in the mode {reset}, which puts dummy transitions into the data: make them with "
-            "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP"
+            "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP (by gymnasium.make_vec: with "
+            'vector_kwargs={"autoreset_mode": ...})'
         )
     if not isinstance(envs.single_observation_space, gymnasium.spaces.Box):
         raise ValueError(

@@ -40,8 +40,8 @@ from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
 from inbounds.learning.storage.whole_files import held
-from inbounds.learning.threads import one_thread
 from inbounds.learning.updates.engine import compiled_engine
+from inbounds.learning.updates.threads import one_thread
 from inbounds.robots.registration import TASK_NAMES
 
 Record: TypeAlias = dict[str, Any]
@@ -61,6 +61,7 @@ class Trainer:
         make_envs: makes the vector environment for a number of seeds; None makes `config.env`.
 
     Raises:
+        TypeError: no configuration, or no function that makes environments.
         ValueError: a `Collector` cannot act in the environments, their bounds are not finite and in order, nothing
             gives the policy's `initial_std`, or there is no engine `compiled`: no extra `fast`, or no kernels.
 
@@ -73,6 +74,12 @@ class Trainer:
     """
 
     def __init__(self, config: TrainConfig, make_envs: Callable[[int], Environments] | None = None) -> None:
+        if not isinstance(config, TrainConfig):
+            raise TypeError(f"a run takes a TrainConfig, such as preset(...) gives, got {config!r}")
+        if make_envs is not None and not callable(make_envs):
+            raise TypeError(
+                f"make_envs is a function of the number of seeds (lambda n: ...), got {make_envs!r}"
+            )
         self.config = config
         self.streams = [SeedStreams.of(seed) for seed in config.seeds]
         num_seeds = len(config.seeds)

@@ -117,6 +117,11 @@ def test_a_diverged_policy_stays_in_the_middle_though_some_weights_are_finite(
         assert policy.act(rng().normal(size=3), way).tolist() == [0.0, 0.0]
     with pytest.raises(ValueError, match="the policy has diverged"):
         policy.distribution(rng().normal(size=3))
+    trainer.diverged[0] = True
+    save_run(tmp_path / "a" / "new folder", trainer)
+    with pytest.warns(RuntimeWarning, match="seed 0 diverged in training: its policy always"):
+        assert load_policy(tmp_path / "a" / "new folder").diverged
+    assert not load_policy(tmp_path / "a" / "new folder", 1).diverged
 
 
 def test_a_file_that_may_not_be_read_is_not_called_damaged(

@@ -17,7 +17,7 @@ import inbounds.robots
 from inbounds.learning import TrainConfig, Trainer
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.run_store import load_policies
-from inbounds.learning.threads import one_thread
+from inbounds.learning.updates.threads import one_thread
 from inbounds.study import Cell, StudyError, StudyFolder, read_cell, run_cell
 from inbounds.study.running import evaluate, file_checks, one_cell
 from inbounds.study.running.cell_lock import CellLock, ClaimedError

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.seeding import SeedStreams
-from inbounds.learning.threads import one_thread
+from inbounds.learning.updates.threads import one_thread
 from inbounds.robots.messages import install_handler
 from inbounds.robots.tasks import Task
 from inbounds.robots.vector_env import TASKS

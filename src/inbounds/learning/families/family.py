@@ -81,8 +81,8 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("log_std_min", "log_std_max", "concentration_max"):
             # Beside a number of NumPy's, which has a precision, float32 actions would be computed in float64.
-            if not isinstance(value := getattr(self, name), Real) or not math.isfinite(value):
-                raise ValueError(f"{name} must be a finite number, got {value!r}")
+            if not isinstance(value := getattr(self, name), Real):
+                raise ValueError(f"{name} must be a number, got {value!r}")
             object.__setattr__(self, name, float(value))
         if not max(abs(self.log_std_min), abs(self.log_std_max)) < 88:
             raise ValueError(
@@ -93,9 +93,9 @@ class Limits:
             raise ValueError(
                 f"log_std_min must be below log_std_max, got {self.log_std_min} and {self.log_std_max}: swap them"
             )
-        if not self.concentration_max > 1:
+        if not 1 < self.concentration_max < math.inf:
             raise ValueError(
-                f"concentration_max must exceed 1, where α and β start, got {self.concentration_max}"
+                f"concentration_max must exceed 1, where α and β start, and be finite, got {self.concentration_max}"
             )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -73,7 +74,7 @@ def save_run(run_dir: str | Path, trainer: Run) -> None:
     """Write the curves and the policies of a run as it stands.
 
     Args:
-        run_dir: the folder; it must exist.
+        run_dir: the folder; made if it does not exist.
         trainer: what `train` returned, with at least one epoch done. (`load_policy` has an example.)
 
     Raises:
@@ -83,6 +84,7 @@ def save_run(run_dir: str | Path, trainer: Run) -> None:
         raise ValueError(
             "a run without an epoch has no curves: train one, or keep its policies by save_policies"
         )
+    Path(run_dir).mkdir(parents=True, exist_ok=True)
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)
 
@@ -239,6 +241,9 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
         ValueError: another version of the package wrote it, with options that this one does not know.
         IndexError: the run has fewer seeds.
 
+    Warns:
+        RuntimeWarning: that seed diverged: its policy does nothing but the middle of the box.
+
     Example:
         >>> import tempfile
         >>> from inbounds.learning import preset, train
@@ -254,7 +259,13 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
         raise IndexError(
             f"the run has {len(policies)} seeds: choose a seed index from 0 to {len(policies) - 1}"
         )
-    return policies[seed_index]
+    if (policy := policies[seed_index]).diverged:
+        warnings.warn(
+            f"seed {policy.seed} diverged in training: its policy always executes the middle of the box",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return policy
 
 
 def _digest_of(config: Any) -> str:

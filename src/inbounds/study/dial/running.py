@@ -88,7 +88,10 @@ class DialFolder:
             DamagedFileError: it is not the file that its checksum belongs to.
         """
         if not self.map_file.is_file():
-            raise FileNotFoundError(f"there is no {self.map_file}: make it (inbounds study dial run)")
+            raise FileNotFoundError(
+                f"there is no {self.map_file}: go to the source tree, which has one, or name its folder with "
+                "--results, or make it (inbounds study dial run)"
+            )
         folder = shlex.quote(str(self.results))
         remedy = f"restore both (git checkout -- {folder}), or make them again (inbounds study dial run)"
         line = self.sum_file.read_text() if self.sum_file.is_file() else ""

@@ -16,7 +16,7 @@ from scipy.special import expit, logit
 
 from inbounds.distributions import LogitNormal
 from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, Trainer, preset, trpo
-from inbounds.learning.threads import one_thread
+from inbounds.learning.updates.threads import one_thread
 from inbounds.study.ledger.evidence import side
 from inbounds.study.ledger.half_of_a_gap import half_left
 from inbounds.study.ledger.untrained_returns import LOUD, untrained

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from inbounds.learning import Trainer, preset
-from inbounds.learning.threads import one_thread
+from inbounds.learning.updates.threads import one_thread
 from inbounds.study.outcomes import Floats
 from inbounds.study.store import ROOT
 

@@ -16,8 +16,8 @@ import torch
 from numpy.typing import NDArray
 
 from inbounds.learning import Trainer
-from inbounds.learning.threads import one_thread
 from inbounds.learning.training import Environments, make_environments
+from inbounds.learning.updates.threads import one_thread
 
 _STREAM = 4  # spawn keys below it are training's
 FINAL = 2**31
