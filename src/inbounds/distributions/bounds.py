@@ -125,10 +125,13 @@ class BoundedDistribution(Distribution):
         except ValueError as error:
             if "support" not in str(error):
                 raise
+            assert self.support is not None  # every law here has one
+            within, value = torch.broadcast_tensors(self.support.check(value), value)
             raise ValueError(
-                f"{error}\nKeep the latent of a sample (rsample_latent, log_prob_latent) instead of reading it back "
-                "from a value that was rounded or clipped, or pass validate_args=False: outside the support "
-                "log_prob is then -inf."
+                f"{int((~within).sum())} of {value.numel()} values lie outside the support, the first of them "
+                f"{value[~within][0].item()}. Keep the latent of a sample (rsample_latent, log_prob_latent) instead of "
+                "reading it back from a value that was rounded or clipped, or pass validate_args=False: outside the "
+                "support log_prob is then -inf."
             ) from None
 
 
