@@ -236,7 +236,7 @@ def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Console) -> int
     )
     if publish_records(cells, command.folder()):
         console.print("records: played", markup=False)
-    console.print(f"{len(played)} cells played now", markup=False)
+    console.print(f"{len(played)} cell{'s' if len(played) != 1 else ''} played now", markup=False)
     return 0
 
 

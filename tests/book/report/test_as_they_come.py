@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from inbounds.book.report import as_they_come as views
@@ -11,16 +10,11 @@ from inbounds.study.analysis import Contrast
 from inbounds.study.grid import select
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.statistics import Comparison, Estimate
+from tests.book.report.made_up import gap
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
 
 BETA = Contrast("standard", "ppo", "beta", "gaussian")
-
-
-def gap(low: float, high: float) -> Estimate:
-    return Estimate(
-        np.array((low + high) / 2), np.array(low), np.array(high), 10, 0, 0.95, "difference of means"
-    )
 
 
 CLEAR = gap(1, 9)

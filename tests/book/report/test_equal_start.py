@@ -2,24 +2,16 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from inbounds.book.report import answers, winners
 from inbounds.book.report.equal_start import Evidence, grade, laws, outcomes_of_both, quiet_starts
 from inbounds.study.grid import AFTERWARDS, ROBOTS, SECOND, select
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.statistics import Estimate
 from inbounds.study.store import StudyFolder
+from tests.book.report.made_up import gap
 from tests.study.small import folder_in
 from tests.study.synthetic import write_cells
-
-
-def gap(low: float, high: float) -> Estimate:
-    return Estimate(
-        np.array((low + high) / 2), np.array(low), np.array(high), 10, 0, 0.95, "difference of means"
-    )
-
 
 CLEAR = Evidence("Ant", "ppo", "beta", "final", gap(300, 900), study=1)
 SECOND_ONE = dataclasses.replace(CLEAR, study=2, p_adjusted=0.01, primary=True)

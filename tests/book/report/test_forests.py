@@ -8,19 +8,13 @@ import pytest
 
 from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.book.report.study_panels import NARROW
-from inbounds.study.statistics import Estimate
+from tests.book.report.made_up import gap
 
 
 @pytest.fixture(autouse=True)
 def close_figures() -> Iterator[None]:
     yield
     plt.close("all")
-
-
-def gap(low: float, high: float) -> Estimate:
-    return Estimate(
-        np.array((low + high) / 2), np.array(low), np.array(high), 10, 0, 0.95, "difference of means"
-    )
 
 
 BARS = {
