@@ -38,6 +38,20 @@ def test_density_and_moments_are_scipys(
     assert float(ours.entropy()) == pytest.approx(scipys.entropy(), rel=1e-8, abs=1e-9)
 
 
+@few
+@given(floats(-1, 4), floats(-1, 4), intervals())
+def test_half_of_the_mass_lies_below_the_median(
+    log_alpha: float, log_beta: float, bounds: tuple[float, float]
+) -> None:
+    (alpha, beta), (low, high) = pair(log_alpha, log_beta), bounds
+    first, second = (x.requires_grad_() for x in double(alpha, beta))
+    median = ScaledBeta(first, second, low, high).median
+    assert not median.requires_grad
+    assert low <= float(median) <= high
+    below = scipy.stats.beta(alpha, beta, low, high - low).cdf(float(median))
+    assert below == pytest.approx(0.5, abs=1e-6)
+
+
 def test_the_normaliser_is_the_gamma_function_of_the_sum() -> None:
     """Fact: Γ(α + β) normalises the density. With the incomplete gamma Γ(α, β), as printed, it does not."""
     alpha, beta = 2.5, 1.5

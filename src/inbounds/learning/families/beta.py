@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.special import betaincinv
 from torch import Tensor
 from torch.distributions import kl_divergence
 
@@ -122,13 +121,6 @@ def beta_entropy(parameters: BetaParameters) -> Tensor:
     return entropy.sum(-1).to(parameters.concentration1.dtype)
 
 
-def beta_median(parameters: BetaParameters) -> Tensor:
-    """Return the medians `[..., A]` of unit actions 2x − 1, by SciPy: torch has no inverse of the incomplete beta."""
-    alpha, beta = (x.detach().double().numpy() for x in parameters)
-    half = torch.from_numpy(np.asarray(betaincinv(alpha, beta, 0.5)))
-    return (2 * half - 1).to(parameters.concentration1.dtype)
-
-
 def beta_head_bias(std: float, limits: Limits) -> tuple[float, float]:
     """Return the pre-activations of α = β with sd² = 1/(2α + 1)."""
     excess = max((1 / std**2 - 1) / 2 - 1, math.ulp(1.0))  # α − 1, which rounds to 0 beside the widest law
@@ -143,7 +135,7 @@ FAMILY = Family(
     entropy=beta_entropy,
     greedy={
         "mean": lambda p: scaled_beta(p).mean,
-        "median": beta_median,
+        "median": lambda p: scaled_beta(p).median,
         "mode": lambda p: scaled_beta(p).mode,
     },
     distribution=lambda p, low, high: ScaledBeta(p.concentration1, p.concentration0, low, high),
