@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from inbounds.book.report import by_noise, secondary_tests
 from inbounds.book.report import second_study as views
-from inbounds.book.report import secondary_tests
 from inbounds.book.report.html import together
 from inbounds.study import second, words
 from inbounds.study.analysis import estimate
@@ -135,3 +135,36 @@ def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> N
     }
     assert {row[4] for row in rows} <= {"higher", "lower", "unresolved", "not after Holm", "waits for seeds"}
     assert all((row[4] == "waits for seeds") == (row[5] == "") for row in rows)
+
+
+def test_the_laws_by_noise(tmp_path) -> None:
+    folder = folder_in(tmp_path)
+    chosen = [c for c in (*SECOND["B"], *SECOND["E"]) if c.robot == "Hopper"]
+    write_cells(folder, [*chosen, *(c for c in SECOND["B"] if c.robot == "Ant")])
+    outcomes = Outcomes.read(folder)
+    shown = by_noise.by_noise(outcomes)
+    _, *rows = rows_of(shown)
+    assert [row[:2] for row in rows] == [*(["Hopper", n] for n in ("0.2", "0.4", "0.55")), ["Ant", "0.4"]]
+    assert "Not run with other noise: HalfCheetah, Ant." in shown.html
+    both = outcomes.and_of(second_cells())
+    for pair in second.PAIRS["other noise"]:
+        noise, law = float(pair.first.variant.removeprefix("noise-")), pair.first.family
+        test = second.compared(both, pair, "final")["Hopper"]
+        assert by_noise.against_gaussian(outcomes, law, noise, "Hopper") == test
+        (row,) = (row for row in rows if row[:2] == ["Hopper", f"{noise:g}"])
+        assert together(spoken(test.difference)) in row[5 if law == "beta" else 6]
+    column = Column("equal", "ppo", "beta")
+    moved = second.pooled_difference(
+        both, column._replace(arm="noise", variant="noise-0.2"), column, "Hopper", "final"
+    )
+    assert by_noise.change(outcomes, "beta", 0.2, "Hopper") == moved
+    assert by_noise.change(outcomes, "beta", 0.2, "Ant") is None
+
+
+def test_a_verdict_by_noise_is_told_in_the_pages_words(tmp_path) -> None:
+    folder = folder_in(tmp_path)
+    cells = [c for c in SECOND["E"] if c.robot == "Hopper" and c.variant == "noise-0.2"]
+    write_cells(folder, cells)
+    _, (*_, beta, logit_normal) = rows_of(by_noise.by_noise(Outcomes.read(folder)))
+    for told in (beta, logit_normal):
+        assert re.search(r"(above|below|no difference found)$", told)
