@@ -36,7 +36,7 @@ GUESSED_BASE = """<script>
 
 def shorten(text: str) -> str:
     """Return a text on one line, cut behind a word where it is too long."""
-    words = textwrap.shorten(text, LONGEST, placeholder="…")
+    words = textwrap.shorten(text, LONGEST, placeholder="…", break_on_hyphens=False)
     return words if words == " ".join(text.split()) else words.removesuffix("…").rstrip(",;:") + "…"
 
 

@@ -33,7 +33,8 @@ def passage(section: nodes.Element) -> str:
     found = [each for each in section.findall(nodes.paragraph) if own(each) and metadata.is_plain(each)]
     long = [each for each in found if len(each.astext()) > 40]
     in_text = [each for each in long if each.parent is section]
-    return textwrap.shorten((in_text or long)[0].astext(), LONGEST, placeholder=" …") if long else ""
+    text = (in_text or long)[0].astext() if long else ""
+    return textwrap.shorten(text, LONGEST, placeholder=" …", break_on_hyphens=False)
 
 
 def sections(doctree: nodes.document) -> list[tuple[str, str, str]]:

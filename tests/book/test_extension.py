@@ -82,6 +82,7 @@ def metadata() -> ModuleType:
 
 def test_descriptions_are_cut_behind_a_word(metadata: ModuleType) -> None:
     assert metadata.shorten("two\n words") == "two words"
+    assert metadata.shorten("logit-normal " * 60).endswith("logit-normal…")
     cut = metadata.shorten("word, " * 60)
     assert len(cut) <= metadata.LONGEST
     assert cut.endswith("word…")

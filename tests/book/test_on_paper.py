@@ -151,3 +151,12 @@ def test_a_deck_has_the_figures_of_the_chapter_and_of_the_study(
     assert ("tall" in curve.get("class", []), "tall" in forest["class"]) == (False, True)
     assert curve["src"] != forest["src"]
     assert {(tmp_path / each["src"]).read_bytes() for each in (curve, forest)} == {b"picture"}
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_without_a_built_book_the_tools_say_what_to_do(
+    tools: tuple, which: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tool = [importlib.import_module("print_book"), tools[1]][which]
+    assert tool.main(["--html", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "make book" in capsys.readouterr().err

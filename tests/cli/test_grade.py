@@ -153,6 +153,7 @@ def test_the_end_of_grading_is_the_end_of_the_students_process(tmp_path: Path) -
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks at a process in /proc")
 def test_what_a_notebook_started_ends_with_it(tmp_path: Path) -> None:
     mark = tmp_path / "pid"
     cell = (
@@ -161,7 +162,12 @@ def test_what_a_notebook_started_ends_with_it(tmp_path: Path) -> None:
     )
     assert graded(notebook(tmp_path / "a.ipynb", IMPORTS, cell, RIGHT, CALL))[0][1] == "passed"
     state = Path(f"/proc/{mark.read_text(encoding='utf8')}/stat")
-    assert not state.exists() or state.read_text(encoding="utf8").split()[2] == "Z"
+    for _ in range(1000):  # a killed process goes in its own time
+        if not state.exists() or state.read_text(encoding="utf8").split()[2] == "Z":
+            break
+        time.sleep(0.01)
+    else:
+        pytest.fail("the child of a notebook outlives it")
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     text = console.export_text()
     console.file.close()
     assert "epoch 3/3  return" in text
-    assert "stopping after this epoch; Ctrl-C again: at once" in text
+    assert "stopping after this epoch; again: at once" in text
     assert "━━━" in text
 
 

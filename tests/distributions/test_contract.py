@@ -257,8 +257,10 @@ def test_float32_agrees_with_float64(family: Family, first: float, log_second: f
 def test_a_value_beyond_the_bounds(family: Family, bad: float) -> None:
     law = family.make()
     value = torch.tensor(bad, dtype=torch.float64)
-    with pytest.raises(ValueError, match="1 of 1 values lie outside the support, the first of them"):
+    with pytest.raises(ValueError, match="1 of 1 values lie outside the support, the first"):
         law.log_prob(value)
+    with pytest.raises(ValueError, match=r"^Values lie outside the support\. Keep the latent"):
+        torch.vmap(law.log_prob)(value.expand(2, 3))
     lax = family.law(*family.parameters(), -1.0, 2.0, validate_args=False)
     log_prob = lax.log_prob(value)
     assert bool(log_prob.isnan()) if np.isnan(bad) else log_prob == -torch.inf

@@ -567,7 +567,7 @@ def test_bad_configurations_are_refused(wrong, message: str) -> None:
         wrong()
 
 
-@pytest.mark.parametrize("seeds", [2.5, True, "3", None])
+@pytest.mark.parametrize("seeds", [2.5, True, "3", b"3", None])
 def test_seeds_are_how_many_or_which(seeds: Any) -> None:
     with pytest.raises(TypeError, match=r"how many \(10\), or which \(\(3, 7\)\); got " + repr(seeds)):
         preset("common", seeds=seeds)

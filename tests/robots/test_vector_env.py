@@ -390,7 +390,7 @@ def test_seeds_may_be_numpys() -> None:
     assert np.array_equal(envs.reset(seed=list(np.array([3, 4])))[0], expected)
 
 
-@pytest.mark.parametrize("seed", ["12", [1.9, 2.9], [1, 2, 3], ["1", "2"], 5.0])
+@pytest.mark.parametrize("seed", ["12", [1.9, 2.9], [1, 2, 3], ["1", "2"], 5.0, np.array(3)])
 def test_what_is_no_seed_is_refused(seed) -> None:
     with pytest.raises(ValueError, match="one seed for each of the 2 robots, or one integer; got"):
         make("Swimmer-v5", 2).reset(seed=seed)

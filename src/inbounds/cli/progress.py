@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import time
 import warnings
 from collections import deque
@@ -93,7 +95,12 @@ class TrainingProgress:
 
     def say_stopping(self) -> None:
         """Add to the line above the bar, in answer to Ctrl-C, when the run will stop; safe in a signal's handler."""
-        self._line.append("  stopping after this epoch; Ctrl-C again: at once", style="bold")
+        said = "stopping after this epoch; again: at once"
+        if self.moves:
+            self._line.append(f"  {said}", style="bold")
+        else:
+            with contextlib.suppress(OSError):
+                os.write(2, f"{said}\n".encode())  # the console may be in the middle of a line of its own
 
     def _picture(self, text: str, done: int) -> Group:
         """Return the numbers, and a bar below them that is as wide as the terminal."""

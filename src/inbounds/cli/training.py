@@ -236,10 +236,9 @@ def _check_environment(config: TrainConfig) -> bool:
             if len(parts := config.env.split(":")) != 2 or not all(parts):
                 raise CommandError(f"{config.env!r} is no environment: give an id, or module:id. {tasks}", 2)
             find_modules_here()
-        envs = make_environments(config, 1)
-        check_environments(envs, 1)
-        envs.close()
-        return hasattr(envs, "get_state")
+        with contextlib.closing(make_environments(config, 1)) as envs:
+            check_environments(envs, 1)
+            return hasattr(envs, "get_state")
     except BackendError:
         raise
     except gymnasium.error.UnregisteredEnv as error:

@@ -127,11 +127,15 @@ class BoundedDistribution(Distribution):
                 raise
             assert self.support is not None  # every law here has one
             within, value = torch.broadcast_tensors(self.support.check(value), value)
+            try:
+                first = value[~within][0].item()
+                count = f"{int((~within).sum())} of {value.numel()} values lie outside the support, the first {first}."
+            except RuntimeError:  # within torch.vmap no value can be looked at
+                count = "Values lie outside the support."
             raise ValueError(
-                f"{int((~within).sum())} of {value.numel()} values lie outside the support, the first of them "
-                f"{value[~within][0].item()}. Keep the latent of a sample (rsample_latent, log_prob_latent) instead of "
-                "reading it back from a value that was rounded or clipped, or pass validate_args=False: outside the "
-                "support log_prob is then -inf."
+                f"{count} Keep the latent of a sample (rsample_latent, log_prob_latent) instead of reading it back "
+                "from a value that was rounded or clipped, or pass validate_args=False: outside the support log_prob "
+                "is then -inf."
             ) from None
 
 

@@ -204,12 +204,13 @@ class ScaledBeta(SigmoidMapped):
 
     @property
     def median(self) -> Tensor:
-        """`[...]` median, by SciPy's inverse of the incomplete beta function; no gradient flows through it."""
+        """`[...]` median, by SciPy's inverse of the incomplete beta function: without a gradient, and not for vmap."""
         from scipy.special import betaincinv  # here, because it takes a while
 
         alpha, beta = (each.detach().cpu().numpy() for each in self._concentrations())
         half = torch.from_numpy(np.asarray(betaincinv(alpha, beta, 0.5))).to(self.low.device)
         median = (self.low.double() + self.width.double() * half).to(self.low.dtype)
+        median = torch.where(median.isnan(), self.mean, median)  # beyond 1e16, where SciPy gives up
         return torch.clamp(median, self.low, self.high).detach()
 
     @property

@@ -98,16 +98,9 @@ class Latents(Distribution):
 
     @property
     def median(self) -> Tensor:
-        """`[..., A]` the latents of a logit-normal's medians: `ExplorationType.MEDIAN`; a Beta's has no closed form.
-
-        Raises:
-            ValueError: for a Beta.
-        """
-        if not isinstance(self.law, LogitNormal):
-            raise ValueError(
-                "a Beta's median has no closed form: use ExplorationType.DETERMINISTIC, its mean"
-            )
-        return self.law.loc
+        """`[..., A]` the latents of the medians: `ExplorationType.MEDIAN`. A Beta's are SciPy's."""
+        law = self.law
+        return law.loc if isinstance(law, LogitNormal) else law.value_to_latent(law.median)
 
     @property
     def mode(self) -> Tensor:

@@ -136,7 +136,10 @@ def preset(
     """
     if algo not in ALGORITHMS:
         raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
-    if isinstance(seeds, bool | str) or not isinstance(seeds, Iterable | int | np.integer):
+    several = (
+        isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes) and getattr(seeds, "ndim", 1) == 1
+    )
+    if isinstance(seeds, bool) or not (several or isinstance(seeds, int | np.integer)):
         raise TypeError(f"seeds is how many (10), or which ((3, 7)); got {seeds!r}")
     if isinstance(seeds, int | np.integer):
         if seeds < 1:

@@ -328,7 +328,8 @@ def _seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int |
     """Return a seed for each robot; None goes on with the generator that is there."""
     if isinstance(seed, int | np.integer):
         return [int(seed) + i for i in range(num_envs)]
-    each = [None] * num_envs if seed is None else list(seed) if isinstance(seed, Iterable) else []
+    several = isinstance(seed, Iterable) and getattr(seed, "ndim", 1) == 1
+    each = [None] * num_envs if seed is None else list(seed) if several else []
     if len(each) != num_envs or not all(s is None or isinstance(s, int | np.integer) for s in each):
         raise ValueError(f"Pass one seed for each of the {num_envs} robots, or one integer; got {seed!r}")
     return [None if s is None else int(s) for s in each]

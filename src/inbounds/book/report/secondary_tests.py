@@ -58,7 +58,7 @@ def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "fi
     Args:
         outcomes: of either study.
         question: a key of `inbounds.study.second.PAIRS`.
-        family: of the first side.
+        family: of the first side, to which the question is put once.
         endpoint: final or area.
     """
     rows = _asked(outcomes, question, family, endpoint)
@@ -102,8 +102,10 @@ def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]]) -> tuple[int, int
 
 
 def _pair(question: str, family: str) -> Pair:
-    (found,) = (pair for pair in PAIRS[question] if pair.first.family == family)
-    return found
+    found = [pair for pair in PAIRS[question] if pair.first.family == family]
+    if len(found) != 1:
+        raise ValueError(f"{question!r} is put to {family} {len(found)} times: ask one that is put once")
+    return found[0]
 
 
 def _asked(outcomes: Outcomes, question: str, family: str, endpoint: str) -> dict[str, Comparison]:

@@ -134,9 +134,9 @@ def _run(notebook: Path, report: Path, seconds: float, gigabytes: float) -> str:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process, and all that it started, which may have outlived it."""
+    """End a process and, where there are process groups, what it started in its own, which may have outlived it."""
     if hasattr(os, "killpg"):
-        with contextlib.suppress(ProcessLookupError):  # nothing is left of its group
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # nothing living is left of its group
             os.killpg(process.pid, signal.SIGKILL)
     else:
         process.kill()

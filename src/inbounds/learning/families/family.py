@@ -13,7 +13,6 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from types import ModuleType
 from typing import Any, Protocol, Self, TypeAlias, TypeVar
 
@@ -81,9 +80,10 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("log_std_min", "log_std_max", "concentration_max"):
             # Beside a number of NumPy's, which has a precision, float32 actions would be computed in float64.
-            if not isinstance(value := getattr(self, name), Real):
-                raise ValueError(f"{name} must be a number, got {value!r}")
-            object.__setattr__(self, name, float(value))
+            try:
+                object.__setattr__(self, name, float(value := getattr(self, name)))
+            except (TypeError, ValueError):
+                raise ValueError(f"{name} must be a number, got {value!r}") from None
         if not max(abs(self.log_std_min), abs(self.log_std_max)) < 88:
             raise ValueError(
                 "log_std_min and log_std_max must lie within ±88, where single precision has a σ, got "

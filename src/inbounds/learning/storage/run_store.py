@@ -242,7 +242,7 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
         IndexError: the run has fewer seeds.
 
     Warns:
-        RuntimeWarning: that seed diverged: its policy does nothing but the middle of the box.
+        RuntimeWarning: that seed diverged: its policy always executes the middle of the box.
 
     Example:
         >>> import tempfile

@@ -128,10 +128,12 @@ class DialEnv(VectorEnv[Any, Any, Any]):
             ValueError: there are not as many seeds as environments.
         """
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+            seeds = list(seed) if isinstance(seed, Sequence) else [seed + i for i in range(self.num_envs)]
             if len(seeds) != self.num_envs:
                 raise ValueError(f"{self.num_envs} environments need {self.num_envs} seeds, got {len(seeds)}")
-            self._generators = [np.random.default_rng(one) for one in seeds]
+            for i, one in enumerate(seeds):
+                if one is not None:  # None goes on with the generator that is there
+                    self._generators[i] = np.random.default_rng(one)
         self._draw()
         return self._signs[0].copy(), {}
 
