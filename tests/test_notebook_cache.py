@@ -14,6 +14,7 @@ import notebook_cache
 import psutil
 import pytest
 from jupyter_cache import get_cache
+from jupyter_cache.cache.db import NbCacheRecord
 from nbformat.v4 import new_code_cell, new_notebook
 
 KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
@@ -75,6 +76,18 @@ def test_a_notebook_is_executed_once_and_a_failing_one_again(
         == f"1 {tree / 'notebooks'} True\n"
     )
     assert "INBOUNDS_BOOK_BUILD" not in os.environ
+
+
+@pytest.mark.slow
+def test_nothing_is_taken_out_of_a_cache_that_is_being_filled(
+    tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library would delete the oldest; of what two processes add at once it takes one for old."""
+    monkeypatch.setattr(NbCacheRecord, "records_to_delete", lambda keep, db: [1])
+    files = [write(tree, name) for name in ("one", "two", "three")]
+    for _ in range(2):
+        notebook_cache.fill("now")
+    assert [len(file.read_text(encoding="utf8").split()) for file in files] == [1, 1, 1]
 
 
 @pytest.mark.slow

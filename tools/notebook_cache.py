@@ -103,4 +103,7 @@ def _execute(cache: str, key: int, timeout: int) -> None:
     from jupyter_cache import get_cache
     from jupyter_cache.executors import load_executor
 
-    load_executor("local-serial", get_cache(cache)).run_and_cache(filter_pks=[key], timeout=timeout)
+    project = get_cache(cache)
+    # With several processes it deletes as old what another one adds between its two questions to the database.
+    project.truncate_caches = lambda: None
+    load_executor("local-serial", project).run_and_cache(filter_pks=[key], timeout=timeout)

@@ -11,21 +11,17 @@ from inbounds.book.report.html import Shown
 from inbounds.book.report.words import graded
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import PAIRS, Pair, compared, pooled_difference
-from inbounds.study.second.pooled import pooled_scores
-from inbounds.study.statistics import Comparison, Estimate, mean_of
+from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.words import spoken, verdict
 
-__all__ = ["LAWS", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change"]
+__all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change"]
 
-LAWS: Mapping[str, str] = MappingProxyType(
-    {"gaussian": "Gaussian", "beta": "Beta", "logit-normal": "logit-normal"}
-)
-"""Families, and their names in the table."""
+BOUNDED: Mapping[str, str] = MappingProxyType({"beta": "Beta", "logit-normal": "logit-normal"})
+"""The laws that are compared with the Gaussian, and their names in the table."""
 NOISES = (0.2, 0.4, 0.55)
 """Executed noise before training, in units of half the range."""
 ROBOTS = ("HalfCheetah", "Hopper", "Ant")
 """On which the other two are planned."""
-NOT_RUN = "not run"
 WORDS = {"higher": "above", "lower": "below", "unresolved": "no difference found"}
 """What the page calls a verdict."""
 
@@ -45,7 +41,7 @@ def change(outcomes: Outcomes, law: str, noise: float, robot: str) -> Estimate |
 
     Args:
         outcomes: of either study.
-        law: a key of `LAWS`.
+        law: gaussian, beta or logit-normal.
         noise: 0.2 or 0.55.
         robot: a robot of `ROBOTS`.
     """
@@ -67,42 +63,34 @@ def against_gaussian(outcomes: Outcomes, law: str, noise: float, robot: str) -> 
 
 
 def by_noise(outcomes: Outcomes) -> Shown:
-    """Return a table: robot and noise, the final return of each law, and its difference from the Gaussian's.
+    """Return a table: by robot and noise, the final return of each bounded law minus the Gaussian's.
 
     Args:
         outcomes: of either study.
     """
     both = with_second(outcomes)
-    tests = {
-        (law, noise): compared(both, _pair(law, noise), "final")
-        for law in ("beta", "logit-normal")
-        for noise in NOISES
-    }
-    rows = []
+    tests = {(law, noise): compared(both, _pair(law, noise), "final") for law in BOUNDED for noise in NOISES}
+    rows, lacking = [], []
     for robot in ROBOTS:
-        for noise in NOISES:
-            returns = [_mean(both, _column(law, noise), robot) for law in LAWS]
-            if all(found == NOT_RUN for found in returns):
-                continue
-            gaps = [_told(tests[law, noise][robot]) for law in ("beta", "logit-normal")]
-            rows.append([robot, f"{noise:g}", *returns, *gaps])
-    head = ["robot", "noise", *LAWS.values(), "Beta − Gaussian", "logit-normal − Gaussian"]
+        found = {noise: [tests[law, noise][robot] for law in BOUNDED] for noise in NOISES}
+        rows += [
+            [f"{robot}, {noise:g}", *map(_told, here)]
+            for noise, here in found.items()
+            if any(test.difference is not None for test in here)
+        ]
+        missing = [f"{noise:g}" for noise, here in found.items() if any(t.difference is None for t in here)]
+        lacking += [f"{robot} with {' and '.join(missing)}"] if missing else []
+    head = ["robot, noise", *(f"{name} − Gaussian" for name in BOUNDED.values())]
     caption = (
-        "PPO, second study: final return by the noise that a law executes before training, with 95 % intervals; ten "
-        "seeds, twenty for Beta and logit-normal at 0.4. The Gaussian's σ depends on the state."
+        "PPO, second study: difference of final returns, by the noise that both laws execute before training. The "
+        "Gaussian's σ depends on the state. Ten seeds; twenty of Beta and logit-normal with 0.4."
     )
-    lacking = [robot for robot in ROBOTS if all(row[:2] != [robot, "0.2"] for row in rows)]
-    strip = [html.missing(f"Not run with other noise: {', '.join(lacking)}.")] if lacking else []
+    strip = [html.missing(f"Not run, or not whole: {', '.join(lacking)}.")] if lacking else []
     return html.of_study("the laws by their first noise", html.table(caption, head, rows), *strip)
-
-
-def _mean(outcomes: Outcomes, column: Column, robot: str) -> str:
-    scores = pooled_scores(outcomes, column, robot, "final")
-    return NOT_RUN if scores is None else spoken(mean_of(scores, missing="exclude"), 0)
 
 
 def _told(found: Comparison) -> str:
     if found.difference is None:
-        return NOT_RUN
+        return "not run"
     word = graded(verdict(found), found.difference)
     return f"{spoken(found.difference)}\n{WORDS.get(word, word)}"
