@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 from inbounds.book.report import html
 from inbounds.book.report.equal_start import with_second
 from inbounds.book.report.html import Shown
+from inbounds.book.report.ways_to_act import BOUNDED
 from inbounds.book.report.words import graded
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import PAIRS, Pair, compared, pooled_difference
@@ -16,12 +14,10 @@ from inbounds.study.words import spoken, verdict
 
 __all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change"]
 
-BOUNDED: Mapping[str, str] = MappingProxyType({"beta": "Beta", "logit-normal": "logit-normal"})
-"""The laws that are compared with the Gaussian, and their names in the table."""
 NOISES = (0.2, 0.4, 0.55)
 """Executed noise before training, in units of half the range."""
-ROBOTS = ("HalfCheetah", "Hopper", "Ant")
-"""On which the other two are planned."""
+ROBOTS = PAIRS["other noise"][0].robots
+"""On which other noise than 0.4 is planned."""
 WORDS = {"higher": "above", "lower": "below", "unresolved": "no difference found"}
 """What the page calls a verdict."""
 
