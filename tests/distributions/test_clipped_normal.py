@@ -117,12 +117,22 @@ def test_mean_and_variance_against_quadrature(
 
 
 @pytest.mark.parametrize(
-    ("loc", "log_scale"), [(-4.0, -0.7), (0.3, -10.0), (0.999, -10.0), (6.0, 0.0), (0.0, 3.0)]
+    ("loc", "log_scale"),
+    [
+        (-4.0, -0.7),
+        (0.3, -10.0),
+        (0.999, -10.0),
+        (6.0, 0.0),
+        (0.0, 3.0),
+        (10.5, 0.0),
+        (-2.5, -1.9),
+        (20.0, 0.0),
+    ],
 )
 def test_variance_does_not_cancel(loc: float, log_scale: float) -> None:
-    """Relative accuracy where nearly all the mass is on one bound, and for the narrowest Normal."""
+    """Relative accuracy for the narrowest Normal, and where nearly all the mass, or all but 1e-80, is on one bound."""
     p = law(loc, log_scale)
-    with mpmath.workdps(60):
+    with mpmath.workdps(500):
         m, s = mpmath.mpf(loc), mpmath.mpf(float(p.scale))
         a, b = (-1 - m) / s, (1 - m) / s
         tails = mpmath.ncdf(a), mpmath.ncdf(-b)
@@ -132,7 +142,7 @@ def test_variance_does_not_cancel(loc: float, log_scale: float) -> None:
         first = a * tails[0] + b * tails[1] + m1
         second = a**2 * tails[0] + b**2 * tails[1] + m2
         exact = float(s**2 * (second - first**2))
-    assert float(p.variance) == relatively(exact, rel=1e-9)
+    assert float(p.variance) == relatively(exact, rel=5e-9)
 
 
 @few

@@ -165,16 +165,20 @@ class ClippedNormal(BoundedDistribution):
     def variance(self) -> Tensor:
         """`[...]` variance of the clipped value, in closed form about the median.
 
-        Good to six digits at any scale. Where a wide Normal's moments cancel, two bounds take over, which meet as the
-        mass inside goes to 0: with the mean m, E[(high − a)(a − low)] = (high − m)(m − low) − variance lies between 0
-        and that mass times a quarter of the squared length of the box.
+        Good to six digits at any scale, and however far outside the mean is. Where a wide Normal's moments cancel, two
+        bounds take over, which meet as the mass inside goes to 0: with the mean m, E[(high − a)(a − low)] =
+        (high − m)(m − low) − variance lies between 0 and that mass times a quarter of the squared length of the box.
         """
         parts = self._parts()
         first, second = self._moments(parts)
-        variance = self.scale.double().square() * (second - first.square()).clamp(min=0)
-        low, high, mean = self.low.double(), self.high.double(), self._mean(parts)
-        most = (high - mean) * (mean - low)
-        least = (most - ((high - low) / 2).square() * parts.m0).clamp(min=0)
+        loc, scale, low, high = (x.double() for x in (self.loc, self.scale, self.low, self.high))
+        variance = scale.square() * (second - first.square()).clamp(min=0)
+        # m − low and high − m, measured from the median: a mean within an ulp of a bound has lost one of them.
+        median, shift = torch.clamp(loc, low, high).detach(), scale * first
+        below, above = median - low + shift, high - median - shift
+        quarter = ((high - low) / 2).square()
+        most = torch.minimum(below * above, quarter)
+        least = (most - quarter * parts.m0).clamp(min=0)
         return torch.minimum(torch.maximum(variance, least), most).to(self.low.dtype)
 
     @property
