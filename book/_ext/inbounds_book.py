@@ -36,20 +36,13 @@ from sphinx.config import Config
 from sphinx.environment import BuildEnvironment
 
 from inbounds.book.explorables.frame import javascript_files
-from inbounds.book.explorer.claims import SCRIPT as CLAIMS_SCRIPT
-from inbounds.book.explorer.element import SCRIPT as EXPLORER_SCRIPT
-from inbounds.book.explorer.picked_seeds import SCRIPTS as SEEDS_SCRIPTS
+from inbounds.book.explorer.assets import SCRIPTS as OF_THE_STUDY
 from inbounds.book.pages.glue import ROLE
 from inbounds.book.pages.programs import continued
 from inbounds.book.report.html import together
 
 FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
-OF_THE_STUDY = {
-    'class="inbounds-study-explorer"': (EXPLORER_SCRIPT,),
-    'class="inbounds-picked-seeds"': SEEDS_SCRIPTS,
-    'class="inbounds-claims"': (CLAIMS_SCRIPT,),
-}  # what a page shows → the scripts that it then needs
 LIVE_FOLDER = "live"  # filled by tools/build_book.py
 LIVE_ROBOT = 'class="inbounds-live-robot"'
 
@@ -101,10 +94,11 @@ def choose_scripts(
     if EXPLORABLE in context.get("body", ""):
         wanted = addresses(javascript_files(), context["pathto"](f"_static/{FOLDER}/", 1))
         app.add_js_file("load_explorables.js", **{"data-scripts": json.dumps(wanted)})
-    for shown, scripts in OF_THE_STUDY.items():
-        if shown in context.get("body", ""):
-            for script in scripts:
-                app.add_js_file(f"{FOLDER}/{script.name}")
+    shown = [
+        scripts for name, scripts in OF_THE_STUDY.items() if f'class="{name}"' in context.get("body", "")
+    ]
+    for script in dict.fromkeys(chain(*shown)):  # a page may show two elements that share a script
+        app.add_js_file(f"{FOLDER}/{script.name}")
     if LIVE_ROBOT in context.get("body", ""):
         for name in ("status.js", "boot.js"):  # all else is loaded when the reader asks for it
             app.add_js_file(f"{LIVE_FOLDER}/{name}")

@@ -5,8 +5,8 @@ from html import unescape
 
 import pytest
 
-from inbounds.book.explorer import claims as module
-from inbounds.book.explorer.claims import FEW, MARKS, claims
+from inbounds.book.explorer.assets import style_sheet
+from inbounds.book.explorer.claims import ELEMENT, FEW, MARKS, claims
 from inbounds.book.report import study_pages
 from inbounds.study.ledger import CLAIMS, Finding, judge
 from inbounds.study.ledger.quotes import quote, verdict
@@ -72,7 +72,7 @@ def test_every_verdict_has_a_sign_and_a_look_of_its_own() -> None:
     words = [*Verdict.__args__, "not tested"]
     assert list(MARKS) == words
     assert len(set(MARKS.values())) == len(words)
-    style = module.SCRIPT.with_suffix(".css").read_text(encoding="utf-8")
+    style = style_sheet(ELEMENT)
     for word in words:
         assert f'[data-verdict="{word}"]' in style
         name = word.replace(" ", "-")

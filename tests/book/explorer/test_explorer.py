@@ -12,6 +12,7 @@ import pytest
 from playwright._impl._driver import compute_driver_executable
 
 from inbounds.book.explorer import element
+from inbounds.book.explorer.assets import SCRIPTS
 from inbounds.book.explorer.choices import (
     Place,
     choices,
@@ -185,7 +186,8 @@ def test_a_verdict_and_its_interval_agree(found: list[Place]) -> None:
 
 def in_node(data: dict[str, Any], picks: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the page's script shows for some choices."""
-    code = element.SCRIPT.read_text(encoding="utf-8") + f";const data = {json.dumps(data)};"
+    code = "".join(path.read_text(encoding="utf-8") for path in SCRIPTS[element.ELEMENT])
+    code += f";const data = {json.dumps(data)};"
     code += (
         f"const picks = {json.dumps(picks)};"
         "const shown = picks.map((p) => inbounds.chosen(data, "

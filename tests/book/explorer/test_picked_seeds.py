@@ -14,6 +14,7 @@ from scipy import stats
 
 from inbounds.book import verdicts
 from inbounds.book.explorer import picked_seeds as module
+from inbounds.book.explorer.assets import SCRIPTS
 from inbounds.book.explorer.choices import verdict
 from inbounds.book.explorer.picked_seeds import Reports, pairs, picked_seeds, reports
 from inbounds.book.report import as_they_come, study_pages
@@ -43,7 +44,7 @@ def data(outcomes: Outcomes) -> dict[str, Any]:
 
 def in_node(expression: str, **values: Any) -> Any:
     """The value of a JavaScript expression, in which `values` are variables."""
-    code = "".join(path.read_text(encoding="utf-8") for path in module.SCRIPTS)
+    code = "".join(path.read_text(encoding="utf-8") for path in SCRIPTS[module.ELEMENT])
     code += ";{" + "".join(f"const {name} = {json.dumps(value)};" for name, value in values.items())
     code += f"console.log(JSON.stringify({expression}))}}"
     node = compute_driver_executable()[0]

@@ -59,7 +59,5 @@
     follow();
   }
 
-  const boot = () => document.querySelectorAll(".inbounds-claims:not([data-state])").forEach(start);
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", boot);
-  else boot();
+  inbounds.page.startAll("inbounds-claims", start);
 })();

@@ -11,18 +11,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
-from inbounds.book.building import builds_the_book
+from inbounds.book.explorer.assets import carried_scripts, style_sheet
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
 from inbounds.study.ledger import Finding
 from inbounds.study.ledger.quotes import judged_anew, quote, verdict
 
-SCRIPT = Path(__file__).with_name("claims.js")
-"""What hides lines; in the built book a page loads it once."""
+ELEMENT = "inbounds-claims"
 MARKS = {"supported": "✓", "refuted": "✗", "undecided": "?", "not tested": "–"}
 """Verdict → the sign beside its word."""
 FEW = 8
@@ -48,13 +46,12 @@ def claims(found: Sequence[Finding]) -> Shown:
         for subject, together in groupby(found, key=lambda each: each.claim.subject)
     }
     counts = Counter(map(verdict, found))
-    live = not builds_the_book()
     element = macros("claims").element(
         subjects,
         {word: counts[word] for word in MARKS if counts[word]} if len(found) > FEW else {},
         MARKS,
-        SCRIPT.with_suffix(".css").read_text(encoding="utf-8"),
-        SCRIPT.read_text(encoding="utf-8") if live else "",
+        style_sheet(ELEMENT),
+        carried_scripts(ELEMENT),
     )
     return html.of_study("claims by subject", str(element))
 
@@ -76,4 +73,4 @@ def _line(finding: Finding) -> dict[str, Any]:
     }
 
 
-__all__ = ["FEW", "MARKS", "SCRIPT", "claims"]
+__all__ = ["FEW", "MARKS", "claims"]

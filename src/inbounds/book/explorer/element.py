@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import functools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from inbounds.book.building import builds_the_book
 from inbounds.book.drawing.alt_text import svg_bytes
 from inbounds.book.drawing.figures import LOOKS
-from inbounds.book.drawing.variables import color_variables
 from inbounds.book.explorables.frame import DASHES
+from inbounds.book.explorer.assets import carried_scripts, style_sheet
 from inbounds.book.explorer.choices import choices, kept_of
 from inbounds.book.report.arms import Part
 from inbounds.book.report.html import NONE_FINISHED
@@ -29,8 +26,7 @@ from inbounds.study.analysis import curve, estimate
 from inbounds.study.grid import COMPARED, ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
 
-SCRIPT = Path(__file__).with_name("explorer.js")
-"""What draws a choice; in the built book a page loads it once."""
+ELEMENT = "inbounds-study-explorer"
 FIRST: Mapping[str, Any] = {
     "start": "standard",
     "algorithm": "ppo",
@@ -39,10 +35,6 @@ FIRST: Mapping[str, Any] = {
     "robots": ROBOTS,
 }
 """What is chosen until the reader chooses, and what the static figure shows, unless a page says otherwise."""
-_COLORS = {
-    "light": {"ink": "#22272d", "line": "#5f6770", "grid": "#dfe3e8", "focus": "#9a5b00", "page": "#ffffff"},
-    "dark": {"ink": "#ced6dd", "line": "#9ca4af", "grid": "#364150", "focus": "#ffd394", "page": "#14181e"},
-}
 
 
 @dataclass(frozen=True)
@@ -66,15 +58,14 @@ class StudyExplorer:
     def _repr_html_(self) -> str:
         looks = {family: {"dash": DASHES[look.linestyle]} for family, look in LOOKS.items()}
         text = json.dumps(self.data | {"looks": looks}, ensure_ascii=False, separators=(",", ":"))
-        live = not builds_the_book()
         return str(
             macros("explorer").explorer(
                 self.data,
                 text.replace("</", "<\\/"),
                 self.first,
                 self.static,
-                style_sheet(),
-                SCRIPT.read_text(encoding="utf-8") if live else "",
+                style_sheet(ELEMENT),
+                carried_scripts(ELEMENT),
             )
         )
 
@@ -133,26 +124,3 @@ def _static(outcomes: Outcomes, first: Mapping[str, Any]) -> str:
     picture = base64.b64encode(svg_bytes(fig)).decode("ascii")
     plt.close(fig)
     return str(macros("explorer").static(picture, alt, algorithm))
-
-
-@functools.cache
-def style_sheet() -> str:
-    """Return the element's style, with the families' colours for both themes.
-
-    Example:
-        >>> "--explorer-beta: #1F8277" in style_sheet()
-        True
-    """
-    return "\n".join(
-        [variables(".inbounds-study-explorer"), SCRIPT.with_suffix(".css").read_text(encoding="utf-8")]
-    )
-
-
-def variables(selector: str) -> str:
-    """Return the colours of text, lines and families as variables of an element, for both themes.
-
-    Example:
-        >>> variables(".a").count("--explorer-beta:")
-        2
-    """
-    return color_variables(selector, "explorer", _COLORS)

@@ -2,8 +2,6 @@
 // the rest draws it. All numbers and all verdicts are in the data: here they are looked up, and points are placed.
 "use strict";
 
-globalThis.inbounds = globalThis.inbounds ?? {};
-
 // data: of inbounds.book.explorer.choices. choice: { start, algorithm, endpoint, families, robots }, the last two sets.
 inbounds.chosen = (data, choice) => {
   const where = `${choice.start}-${choice.algorithm}`;
@@ -48,21 +46,8 @@ inbounds.chosen = (data, choice) => {
 };
 
 (() => {
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (name, attributes = {}, ...children) => {
-    const node = document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    node.append(...children);
-    return node;
-  };
-  const draw = (name, attributes = {}, text = "") => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text) node.textContent = text;
-    return node;
-  };
+  const { make, draw, color, followWidth, startAll } = inbounds.page;
   const write = (x) => String(Number(x.toPrecision(3))).replace("-", "−");
-  const color = (name) => `var(--explorer-${name})`;
 
   // At most `count` round numbers from low to high.
   function ticks(low, high, count) {
@@ -171,19 +156,12 @@ inbounds.chosen = (data, choice) => {
     form.addEventListener("submit", (event) => event.preventDefault());
     container.querySelector(".explorer-static").hidden = true;
     live.hidden = false;
-    new ResizeObserver(() => {
-      if (live.clientWidth && live.clientWidth !== width) {
-        width = live.clientWidth;
-        show();
-      }
-    }).observe(live);
+    followWidth(live, (room) => {
+      width = room;
+      show();
+    });
     container.dataset.state = "live";
   }
 
-  const boot = () => {
-    for (const container of document.querySelectorAll(".inbounds-study-explorer:not([data-state])")) start(container);
-  };
-  if (!globalThis.document) return; // node: only `chosen` is wanted
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", boot);
-  else boot();
+  startAll("inbounds-study-explorer", start);
 })();

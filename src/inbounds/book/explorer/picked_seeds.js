@@ -68,20 +68,7 @@ inbounds.seeds = (() => {
 
 (() => {
   const { welch, reports, number, spoken, verdict } = inbounds.seeds;
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (name, attributes = {}, ...children) => {
-    const node = document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    node.append(...children);
-    return node;
-  };
-  const draw = (name, attributes = {}, text = "") => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text) node.textContent = text;
-    return node;
-  };
-  const color = (name) => `var(--explorer-${name})`;
+  const { make, draw, color, followWidth, startAll } = inbounds.page;
   const round = (x) => number(Number(x.toPrecision(2)));
   const thousands = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, "\u202f");
   const percent = (x) => (x > 0 && x < 0.001 ? "under 0.1\u202f%" : `${(100 * x).toFixed(x > 0 && x < 0.1 ? 1 : 0)}\u202f%`);
@@ -269,19 +256,12 @@ inbounds.seeds = (() => {
     form.addEventListener("submit", (event) => event.preventDefault());
     container.querySelector(".seeds-static").hidden = true;
     live.hidden = false;
-    new ResizeObserver(() => {
-      if (live.clientWidth && live.clientWidth !== width) {
-        width = live.clientWidth;
-        show();
-      }
-    }).observe(live);
+    followWidth(live, (room) => {
+      width = room;
+      show();
+    });
     container.dataset.state = "live";
   }
 
-  const boot = () => {
-    for (const container of document.querySelectorAll(".inbounds-picked-seeds:not([data-state])")) start(container);
-  };
-  if (!globalThis.document) return; // node: only the arithmetic is wanted
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", boot);
-  else boot();
+  startAll("inbounds-picked-seeds", start);
 })();

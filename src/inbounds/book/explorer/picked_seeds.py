@@ -10,12 +10,10 @@ interval, and the same for *every* way to take so many seeds a side, enumerated,
 from __future__ import annotations
 
 import base64
-import functools
 import itertools
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -23,11 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from inbounds.book.building import builds_the_book
 from inbounds.book.drawing import figures
 from inbounds.book.drawing.alt_text import svg_bytes
+from inbounds.book.explorer.assets import carried_scripts, style_sheet
 from inbounds.book.explorer.choices import verdict
-from inbounds.book.explorer.element import variables
 from inbounds.book.report import as_they_come
 from inbounds.book.report.as_they_come import Compared
 from inbounds.book.report.html import NONE_FINISHED
@@ -37,16 +34,14 @@ from inbounds.book.templates import macros
 from inbounds.study.analysis import scores
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Outcomes
+from inbounds.study.statistics.comparisons import welch_freedom
 from inbounds.study.words import percent, spoken
 
+ELEMENT = "inbounds-picked-seeds"
 FIRST = ("HalfCheetah", "ppo", ("logit-normal", "beta"))
 """Robot, algorithm and pair until the reader chooses; the first finished one where this is not."""
 TICKED = 3
 """Seeds a side that are ticked at first."""
-SCRIPTS = tuple(
-    Path(__file__).parent.parent / name for name in ("explorables/numerics.js", "explorer/picked_seeds.js")
-)
-"""In the order in which a page loads them."""
 
 
 @dataclass(frozen=True)
@@ -99,10 +94,8 @@ def reports(first: ArrayLike, second: ArrayLike, picked: tuple[int, int] = (TICK
     ]
     a, b = (side.var(axis=1, ddof=1) / side.shape[1] for side in sides)
     parts = a[:, None], b[None, :]  # [A, 1], [1, B]
-    variance = parts[0] + parts[1]
-    freedom = variance**2 / (parts[0] ** 2 / (picked[0] - 1) + parts[1] ** 2 / (picked[1] - 1))
     value = sides[0].mean(axis=1)[:, None] - sides[1].mean(axis=1)
-    reach = stats.t.ppf(0.975, freedom) * np.sqrt(variance)
+    reach = stats.t.ppf(0.975, welch_freedom(parts, picked)) * np.sqrt(sum(parts))
     return Reports(value, value - reach, value + reach)
 
 
@@ -110,6 +103,7 @@ def pairs(outcomes: Outcomes) -> Iterator[tuple[Compared, list[NDArray[np.float6
     """Yield the finished differences from the usual starts, final return, each with the results of both sides.
 
     Example:
+        >>> from pathlib import Path
         >>> from inbounds.study.store import StudyFolder
         >>> list(pairs(Outcomes.read(StudyFolder(Path("no/results")))))
         []
@@ -139,11 +133,11 @@ class PickedSeeds:
     def _repr_html_(self) -> str:
         if not self.data["rows"]:
             return self.static
-        live = not builds_the_book()
         text = json.dumps(self.data, ensure_ascii=False, separators=(",", ":"))
-        scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS) if live else ""
         return str(
-            macros("picked_seeds").element(text.replace("</", "<\\/"), self.static, style_sheet(), scripts)
+            macros("picked_seeds").element(
+                text.replace("</", "<\\/"), self.static, style_sheet(ELEMENT), carried_scripts(ELEMENT)
+            )
         )
 
 
@@ -154,6 +148,7 @@ def picked_seeds(outcomes: Outcomes) -> PickedSeeds:
         outcomes: of the first study, as `study_pages.shipped` reads them.
 
     Example:
+        >>> from pathlib import Path
         >>> from inbounds.study.store import StudyFolder
         >>> picked_seeds(Outcomes.read(StudyFolder(Path("no/results"))))
         <study: pick your own seeds>
@@ -211,17 +206,4 @@ def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
     return str(macros("picked_seeds").static(picture, alt))
 
 
-@functools.cache
-def style_sheet() -> str:
-    """Return the element's style, with the families' colours for both themes.
-
-    Example:
-        >>> "--explorer-beta: #1F8277" in style_sheet()
-        True
-    """
-    return "\n".join(
-        [variables(".inbounds-picked-seeds"), SCRIPTS[1].with_suffix(".css").read_text(encoding="utf-8")]
-    )
-
-
-__all__ = ["FIRST", "SCRIPTS", "TICKED", "PickedSeeds", "Reports", "pairs", "picked_seeds", "reports"]
+__all__ = ["FIRST", "TICKED", "PickedSeeds", "Reports", "pairs", "picked_seeds", "reports"]

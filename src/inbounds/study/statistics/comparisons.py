@@ -7,7 +7,7 @@ the number is shared. Where an arm is paired by design (the same networks, noise
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,10 +105,25 @@ def difference(
 
 def welch(a: Floats, b: Floats) -> tuple[float, float]:
     """Return the standard error of mean(a) − mean(b) and its degrees of freedom (Welch 1947)."""
-    parts = np.array([a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)])
-    if parts.sum() == 0:
-        return 0.0, float(len(a) + len(b) - 2)
-    return float(np.sqrt(parts.sum())), float(parts.sum() ** 2 / (parts**2 / [len(a) - 1, len(b) - 1]).sum())
+    parts = [a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)]
+    return float(np.sqrt(sum(parts))), float(welch_freedom(parts, [len(a), len(b)]))
+
+
+def welch_freedom(parts: Sequence[ArrayLike], sizes: Sequence[int]) -> Floats:
+    """Return the degrees of freedom of a sum of independent means `[...]` (Welch 1947).
+
+    Args:
+        parts: the estimated variance of each mean, `[...]` each, broadcast together.
+        sizes: seeds of each mean. Where no part is positive, their sum less one a mean is returned.
+
+    Example:
+        >>> round(float(welch_freedom([0.5, 0.5], [10, 10])), 9), float(welch_freedom([0.5, 0.0], [10, 7]))
+        (18.0, 9.0)
+    """
+    variance = np.asarray(sum(np.asarray(part, float) for part in parts))
+    squares = sum(np.asarray(part, float) ** 2 / (n - 1) for part, n in zip(parts, sizes, strict=True))
+    most = np.full_like(variance, sum(sizes) - len(sizes))
+    return np.asarray(np.divide(variance**2, squares, out=most, where=variance > 0))
 
 
 def permutation_test(

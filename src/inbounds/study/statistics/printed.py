@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inbounds.study.statistics.comparisons import Comparison, compare, difference
+from inbounds.study.statistics.comparisons import Comparison, compare, difference, welch_freedom
 from inbounds.study.statistics.interval_coverage import coverage_ceiling
 from inbounds.study.statistics.intervals import (
     Estimate,
@@ -128,13 +128,10 @@ def combination(groups: Sequence[Floats], weights: Sequence[float]) -> Estimate:
     replicates = sum(
         (w * each for w, each in zip(weights, drawn, strict=True)), start=np.zeros(MANY_RESAMPLES)
     )
-    parts = np.array([w**2 * x.var(ddof=1) / len(x) for w, x in zip(weights, kept, strict=True)])
-    sizes = np.array([len(x) for x in kept])
-    freedom = (
-        parts.sum() ** 2 / (parts**2 / (sizes - 1)).sum() if parts.sum() else float(sizes.sum() - len(kept))
-    )
-    low, high = limits(replicates, LEVEL, "expanded", int(sizes.min()), freedom)
+    parts = [w**2 * x.var(ddof=1) / len(x) for w, x in zip(weights, kept, strict=True)]
+    sizes = [len(x) for x in kept]
+    low, high = limits(replicates, LEVEL, "expanded", min(sizes), welch_freedom(parts, sizes))
     value = np.asarray(sum(w * x.mean() for w, x in zip(weights, kept, strict=True)))
     ceiling = coverage_ceiling(len(kept[0])) if len(kept) == 1 else 1.0
     name = "mean" if len(kept) == 1 else "difference of means"
-    return Estimate(value, low, high, int(sizes.min()), lost, LEVEL, name, ceiling=ceiling)
+    return Estimate(value, low, high, min(sizes), lost, LEVEL, name, ceiling=ceiling)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import stats
 
+from inbounds.study.statistics.comparisons import welch_freedom
 from inbounds.study.statistics.seeds import Floats
 
 Draw = Callable[[np.random.Generator, tuple[int, int]], Floats]
@@ -34,10 +35,9 @@ def _needed_effects(
             f"expected n ≥ 2, trials ≥ 1, tests ≥ 1, level in (0, 1); got {n}, {trials}, {tests}, {level}"
         )
     a, b = draw(rng, (trials, n)), draw(rng, (trials, n))
-    parts = np.stack([a.var(-1, ddof=1), b.var(-1, ddof=1)]) / n
-    freedom = parts.sum(0) ** 2 * (n - 1) / (parts**2).sum(0)
-    critical = stats.t.isf(level / tests / 2, freedom)
-    return critical * np.sqrt(parts.sum(0)) - (a.mean(-1) - b.mean(-1))
+    parts = [each.var(-1, ddof=1) / n for each in (a, b)]
+    critical = stats.t.isf(level / tests / 2, welch_freedom(parts, [n, n]))
+    return critical * np.sqrt(sum(parts)) - (a.mean(-1) - b.mean(-1))
 
 
 def power(
