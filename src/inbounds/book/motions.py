@@ -22,14 +22,13 @@ from inbounds import robots
 from inbounds.book.report.over_seeds import final_policies
 from inbounds.learning import TrainedPolicy, Trainer, preset
 from inbounds.study import store
-from inbounds.study.grid import AFTERWARDS
+from inbounds.study.grid import AFTERWARDS, COMPARED
 from inbounds.study.ledger.untrained_returns import LOUD
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import StudyFolder
 
 Floats = NDArray[np.float64]
-FAMILIES = ("gaussian", "beta", "logit-normal")
 LEVELS: Mapping[str, float | None] = {"quiet": 0.4, "default": None, "loud": LOUD}
 """Executed noise of untrained policies; None is each family's own."""
 TERMS = ("forward", "ctrl", "survive", "contact")
@@ -209,7 +208,7 @@ def of_updates() -> Iterator[tuple[str, Floats]]:
     `move` is the root mean square over the first 512 states of what the outputs move by, `length` the mean KL
     divergence of old from new law there, in nats.
     """
-    for family in FAMILIES:
+    for family in COMPARED:
         trainer = Trainer(preset("common", "HalfCheetah-v5", policy=family, epochs=1))
         networks, policy = trainer.networks, trainer.networks.policy
         states = trainer.collector.collect(512).obs

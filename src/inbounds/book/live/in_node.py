@@ -60,12 +60,7 @@ def run(
         [2, 4]
     """
     made = [bundle() / name for name in ("engine.js", "wasm.js")] if engine else []
-    page = [
-        path
-        for path in scripts()
-        if path.name not in ("boot.js", "scene.js", "dom.js", "panel.js", "show.js")
-    ]
-    listed = [str(path) for path in (*made, *page, *files)]
+    listed = [str(path) for path in (*made, *scripts(drawn=False), *files)]
     done = subprocess.run(
         [node(), "-e", _DRIVER],
         input=json.dumps({"files": listed, "code": code, "values": values}),

@@ -20,26 +20,18 @@ NUMERICS = Path(__file__).parents[1] / "explorables" / "numerics.js"
 LARGEST = 20_000_000  # bytes of all policies together
 
 
-def scripts() -> list[Path]:
-    """Return the scripts of the page's own, in the order in which they can be run.
+def scripts(*, drawn: bool = True) -> list[Path]:
+    """Return the scripts that a page runs, in this order, after those that `packages` makes and the catalogue.
+
+    Args:
+        drawn: with those that draw, which need a page.
 
     Example:
-        >>> [path.name for path in scripts()][:3]
-        ['numerics.js', 'laws.js', 'policy.js']
+        >>> [path.name for path in scripts(drawn=False)]
+        ['numerics.js', 'laws.js', 'policy.js', 'noise.js', 'world.js', 'player.js', 'densities.js']
     """
-    names = (
-        "laws",
-        "policy",
-        "noise",
-        "world",
-        "player",
-        "densities",
-        "scene",
-        "dom",
-        "panel",
-        "show",
-        "boot",
-    )
+    names = ["laws", "policy", "noise", "world", "player", "densities"]
+    names += ["scene", "dom", "panel", "show"] if drawn else []
     return [NUMERICS, *(JS / f"{name}.js" for name in names)]
 
 
@@ -75,11 +67,12 @@ def write(target: Path) -> str:
     if (total := export.write(target)) > LARGEST:
         raise ValueError(f"the policies take {total / 1e6:.1f} MB, more than {LARGEST / 1e6:.0f} MB")
     loaded = sum((target / path.name).stat().st_size for path in (*scripts(), *made.glob("*.js")))
-    _say(target, size=f"This loads {loaded / 1e6:.1f} MB, once, from this book.")
+    parts = ["engine.js", "wasm.js", "three.js", "catalogue.js", *(path.name for path in scripts())]
+    _say(target, size=f"This loads {loaded / 1e6:.1f} MB, once, from this book.", parts=parts)
     return ""
 
 
-def _say(target: Path, **status: str) -> None:
+def _say(target: Path, **status: str | list[str]) -> None:
     (target / "status.js").write_text(
         "globalThis.inbounds ??= {};\ninbounds.live ??= {};\n"
         f"inbounds.live.status = {json.dumps(status, ensure_ascii=False)};\n",

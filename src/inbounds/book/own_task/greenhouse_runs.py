@@ -19,12 +19,11 @@ import pyarrow.parquet as pq
 
 from inbounds.book.own_task.comparing import Actor, Floats, greedy, noisy, play
 from inbounds.book.own_task.greenhouse import GreenhouseBatch
-from inbounds.learning import TrainConfig, TrainedPolicy, Trainer, load_policies, preset
+from inbounds.learning import FAMILIES, TrainConfig, TrainedPolicy, Trainer, load_policies, preset
 from inbounds.learning.storage.run_store import save_policies
 
 __all__ = ["CHOSEN_BY", "FAMILIES", "TESTED", "plan", "policies", "read_curves", "read_returns"]
 
-FAMILIES = ("gaussian", "clipped-gaussian", "beta", "logit-normal")
 CHOSEN_BY = tuple(range(5000, 5040))
 """Days for choosing: the constant, the numbers of the thermostat, the settings of training."""
 TESTED = tuple(range(6000, 6200))

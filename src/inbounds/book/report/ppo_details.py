@@ -21,16 +21,16 @@ from inbounds.book import verdicts
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report.html import Shown
 from inbounds.book.templates import macros
+from inbounds.learning import FAMILIES
 from inbounds.study import StudyFolder, analysis
 from inbounds.study.cell import ROBOTS
-from inbounds.study.grid import FREE, all_cells
+from inbounds.study.grid import COMPARED, FREE, all_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.primary import pooled_difference
 from inbounds.study.statistics import Estimate
 
 __all__ = ["DETAILS", "Detail", "Effect", "effect_table", "effects", "not_measured", "tally_of"]
 
-FAMILIES = ("gaussian", "clipped-gaussian", "beta", "logit-normal")
 Pairs = tuple[tuple[Column, Column], ...]
 
 
@@ -53,7 +53,7 @@ def _second(arm: str, variant: str, gaussian: str = "") -> Pairs:
     """Return columns of an arm beside those of the equal start, family by family."""
     return tuple(
         (Column(arm, "ppo", f, variant), Column("equal", "ppo", f, gaussian if f == "gaussian" else ""))
-        for f in ("gaussian", "beta", "logit-normal")
+        for f in COMPARED
     )
 
 

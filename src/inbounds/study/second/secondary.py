@@ -15,7 +15,7 @@ import numpy as np
 from inbounds.study import statistics
 from inbounds.study.analysis import scores
 from inbounds.study.cell import ROBOTS
-from inbounds.study.grid import FREE
+from inbounds.study.grid import COMPARED, FREE
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.primary import gap
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
@@ -175,7 +175,7 @@ def starts(outcomes: Outcomes, column: Column, robot: str) -> dict[str, float] |
 
 TWINS = tuple(
     (Column("equal", "ppo", family), Column("mechanisms", "ppo", family, "matched-noise"), robot)
-    for family in ("gaussian", "beta", "logit-normal")
+    for family in COMPARED
     for robot in ("HalfCheetah", "Hopper")
 )
 """Cells of both studies that differ by engine and seeds alone."""

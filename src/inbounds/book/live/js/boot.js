@@ -37,12 +37,10 @@ inbounds.live ??= {};
     return "";
   }
 
-  const PARTS = ["numerics", "laws", "policy", "noise", "world", "player", "densities", "scene", "dom", "panel", "show"];
-
   // MuJoCo, started once a page.
   live.start = () => {
     live.started ??= (async () => {
-      for (const part of ["engine", "wasm", "three", "catalogue", ...PARTS]) await live.load(`${part}.js`);
+      for (const part of live.status.parts) await live.load(part); // as the build has listed them
       const wasmBinary = new Uint8Array(await live.unpack(live.wasm));
       const mujoco = await live.engine.load({ wasmBinary, print: console.debug, printErr: console.debug });
       delete live.wasm;
