@@ -18,7 +18,7 @@ CAUSES = [
         "cause-noise",
         _CAUSE,
         "The gain comes from the bounded support.",
-        "ch. 6, 1st paragraph; ch. 7",
+        "ch. 5, 1st paragraph; ch. 6, 1st paragraph; ch. 7",
         "Final return: with equal executed noise at the start, at least half of the gain (logit-normal − "
         "Gaussian) is left on every robot with such cells that has one. (That would exclude the noise at the "
         "start as the cause; it would not show that the bounds are it.)",
@@ -139,9 +139,9 @@ TRUST = [
     Claim(
         "beta-hessian",
         _TRUST,
-        "The Hessian of the Beta's KL cannot be computed analytically.",
+        "The Hessian of the Beta's KL, computed analytically, meets a numerical problem.",
         "section 2.5; ch. 4",
-        "It can: automatic differentiation against the trigamma functions, relative error "
+        "It does not, in double precision: automatic differentiation against the trigamma functions, relative error "
         f"below {computed.EXACT:.0e}, counts against.",
         computed.agrees("relative error of vᵀFv", computed.error_of_beta_fisher, claimed=False),
     ),

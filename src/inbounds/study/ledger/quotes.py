@@ -57,9 +57,9 @@ _LARGE = Quote(
 QUOTES: Mapping[str, Quote] = MappingProxyType(
     {
         "start": Quote(
-            "What can be clearly seen in this plot is that Gaussian policy started its performance much lower than the "
-            "others.",
-            "chapter 5",
+            "What is striking in these results is that each experiment starts with a very poor performance in the case "
+            "of Gaussian policy.",
+            "chapter 6",
         ),
         "start-cause": _CAUSE,
         "start-cause-drawn": _CAUSE,
@@ -90,9 +90,9 @@ QUOTES: Mapping[str, Quote] = MappingProxyType(
             "chapter 5",
         ),
         "cause-noise": Quote(
-            "The boundary effect is solved by Logitnormal distribution with the help of the fact that it is supported "
-            "on the bound.",
-            "chapter 6",
+            "We conducted the experiments to evaluate performance improvements of Logitnormal distribution from "
+            "addressing the boundary effect.",
+            "chapter 5",
         ),
         "beta-entropy": Quote(
             "This is essential for Beta policy since it has no scale parameter to clip.", "chapter 4"
