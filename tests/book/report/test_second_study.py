@@ -120,8 +120,10 @@ def test_a_finding_is_kept_where_the_wider_correction_finds_it(outcomes: Outcome
     assert 0 < len(staying) < len(told)
     one = told[0].question, told[0].pair.first.family
     for asked in ({(row.question, row.pair.first.family) for row in rows}, {one}):
-        counts = [sum((r.question, r.pair.first.family) in asked for r in some) for some in (staying, told)]
-        assert secondary_tests.kept(outcomes, asked) == tuple(counts)
+        expected = [r for r in told if (r.question, r.pair.first.family) in asked]
+        found = secondary_tests.findings(outcomes, asked)
+        assert [(r.pair, r.robot) for r in found] == [(r.pair, r.robot) for r in expected]
+        assert [r.p_over_everything < 0.05 for r in found] == [r in staying for r in expected]
 
 
 def test_secondary_rows_are_those_whose_cells_are_there(outcomes: Outcomes) -> None:

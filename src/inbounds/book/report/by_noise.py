@@ -12,7 +12,7 @@ from inbounds.study.second import PAIRS, Pair, compared, pooled_difference
 from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.words import spoken, verdict
 
-__all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change"]
+__all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change", "column"]
 
 NOISES = (0.2, 0.4, 0.55)
 """Executed noise before training, in units of half the range."""
@@ -22,13 +22,19 @@ WORDS = {"higher": "above", "lower": "below", "unresolved": "no difference found
 """What the page calls a verdict."""
 
 
-def _column(law: str, noise: float) -> Column:
+def column(law: str, noise: float) -> Column:
+    """Return the second study's column of a law that starts with a noise, its σ of the state.
+
+    Args:
+        law: gaussian, beta or logit-normal.
+        noise: one of `NOISES`.
+    """
     return Column("equal", "ppo", law) if noise == 0.4 else Column("noise", "ppo", law, f"noise-{noise:g}")
 
 
 def _pair(law: str, noise: float) -> Pair:
     asked = "law, σ of the state" if noise == 0.4 else "other noise"
-    (found,) = (pair for pair in PAIRS[asked] if pair.first == _column(law, noise))
+    (found,) = (pair for pair in PAIRS[asked] if pair.first == column(law, noise))
     return found
 
 
@@ -41,7 +47,7 @@ def change(outcomes: Outcomes, law: str, noise: float, robot: str) -> Estimate |
         noise: 0.2 or 0.55.
         robot: a robot of `ROBOTS`.
     """
-    return pooled_difference(with_second(outcomes), _column(law, noise), _column(law, 0.4), robot, "final")
+    return pooled_difference(with_second(outcomes), column(law, noise), column(law, 0.4), robot, "final")
 
 
 def against_gaussian(outcomes: Outcomes, law: str, noise: float, robot: str) -> Comparison:

@@ -96,12 +96,16 @@ def leads(outcomes: Outcomes) -> Shown:
         return html.of_study(what, html.NONE_FINISHED)
     panels = {name: _bars(found, endpoint) for endpoint, name in ENDPOINTS.items()}
     alt = f"Law minus Gaussian with 95 percent intervals, by the kind of start. {in_words(panels)}"
+    lent = any(lead.start == "both quiet" and lead.study == 1 for lead in found)
+    stand_ins = (
+        " (hollow: cells of the first study, in which the law may have its usual start)" if lent else ""
+    )
     caption = (
         "Law minus Gaussian, where that is found above 0 from the usual starts. Bars: 95 % bootstrap intervals, not "
-        "corrected. Both quiet: executed noise 0.4 before training; on some robots only the Gaussian was made quiet, "
-        "the law being nearly so. Filled there: the second study's cells, with fresh seeds and a Gaussian whose σ is "
-        "free, so that more than the start differs; hollow: the first's. Both loud: the logit-normal executes 0.7, the "
-        "Gaussian 0.72. Grey: too small to choose by. A bar that is not there is an experiment that nobody has run."
+        "corrected. Both quiet: executed noise 0.4 before training, in the second study, with fresh seeds and a "
+        f"Gaussian whose σ is free, so that more than the start differs{stand_ins}. Both loud: the logit-normal "
+        "executes 0.7, the Gaussian 0.72. Grey: too small to choose by. A bar that is not there is an experiment that "
+        "nobody has run."
     )
     return html.of_study(what, html.figure_of(of_robots(panels), alt, caption))
 

@@ -14,9 +14,8 @@ from inbounds.book.report.equal_start import with_second
 from inbounds.book.report.html import NONE_FINISHED, Shown
 from inbounds.book.report.words import HEADS, WAITS, by_robot, column_name, graded
 from inbounds.study.outcomes import Outcomes
-from inbounds.study.second import PAIRS, Pair, compared, pooled_difference, secondary
+from inbounds.study.second import PAIRS, Pair, SecondaryRow, compared, pooled_difference, secondary
 from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import p_value, spoken, verdict
 
 
@@ -83,22 +82,23 @@ def difference(
     return found
 
 
-def kept(outcomes: Outcomes, asked: Iterable[tuple[str, str]]) -> tuple[int, int]:
-    """Return how many findings of final return stay, all secondary tests corrected together, of how many.
+def findings(outcomes: Outcomes, asked: Iterable[tuple[str, str]]) -> list[SecondaryRow]:
+    """Return what is found of the final return, each test corrected over its robots.
+
+    It stays, were all secondary tests corrected together, where `p_over_everything` is below `SIGNIFICANCE`.
 
     Args:
         outcomes: of either study.
-        asked: question and family of each comparison, as for `verdicts`.
+        asked: question and family of each comparison; a question may be put to a family more than once.
     """
     wanted = {(question, family, "final") for question, family in asked}
-    found = [
+    return [
         row
         for row in secondary(with_second(outcomes))
         if (row.question, row.pair.first.family, row.endpoint) in wanted
         and row.comparison.difference is not None
         and _verdict(row.comparison) in ("higher", "lower")
     ]
-    return sum(row.p_over_everything < SIGNIFICANCE for row in found), len(found)
 
 
 def _pair(question: str, family: str) -> Pair:
