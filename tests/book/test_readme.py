@@ -54,7 +54,7 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     trpo = answers.of(final, algorithm="trpo")
     assert [(row.robot, grade(row)) for row in trpo] == [("HalfCheetah", "suggested"), ("Ant", "suggested")]
     assert len(answers.sides(trpo)[0]) == 2
-    assert "Under TRPO, run on HalfCheetah and Ant alone, it is higher on both (suggested)." in said
+    assert "Under TRPO, compared on HalfCheetah and Ant alone, it is higher on both (suggested)." in said
 
 
 def test_a_law(outcomes: Outcomes) -> None:

@@ -165,16 +165,17 @@ class ClippedNormal(BoundedDistribution):
     def variance(self) -> Tensor:
         """`[...]` variance of the clipped value, in closed form about the median.
 
-        Good to six digits at any scale, and however far outside the mean is. Where a wide Normal's moments cancel, two
-        bounds take over, which meet as the mass inside goes to 0: with the mean m, E[(high − a)(a − low)] =
-        (high − m)(m − low) − variance lies between 0 and that mass times a quarter of the squared length of the box.
+        Good to six digits, however far outside the mean is, for a scale of up to some hundred lengths of the box; to
+        three for a larger one. Where a wide Normal's moments cancel, two bounds take over, which meet as the mass
+        inside goes to 0: with the mean m, E[(high − a)(a − low)] = (high − m)(m − low) − variance lies between 0 and
+        that mass times a quarter of the squared length of the box.
         """
         parts = self._parts()
         first, second = self._moments(parts)
-        loc, scale, low, high = (x.double() for x in (self.loc, self.scale, self.low, self.high))
-        variance = scale.square() * (second - first.square()).clamp(min=0)
+        variance = self.scale.double().square() * (second - first.square()).clamp(min=0)
         # m − low and high − m, measured from the median: a mean within an ulp of a bound has lost one of them.
-        median, shift = torch.clamp(loc, low, high).detach(), scale * first
+        low, high = self.low.double(), self.high.double()
+        median, shift = self._from_median(parts)
         below, above = median - low + shift, high - median - shift
         quarter = ((high - low) / 2).square()
         most = torch.minimum(below * above, quarter)
@@ -213,11 +214,15 @@ class ClippedNormal(BoundedDistribution):
         return _Parts.of((self.low.double() - loc) / scale, (self.high.double() - loc) / scale)
 
     def _mean(self, parts: _Parts) -> Tensor:
+        median, shift = self._from_median(parts)
+        return median + shift
+
+    def _from_median(self, parts: _Parts) -> tuple[Tensor, Tensor]:
+        """Return the median, detached, and the mean minus it: on paper, their sum does not depend on the pivot."""
         loc, scale, low, high = (x.double() for x in (self.loc, self.scale, self.low, self.high))
-        pivot = torch.clamp(loc, low, high).detach()  # on paper, the mean does not depend on it
-        on_bounds = (low - pivot) * parts.log_low.exp() + (high - pivot) * parts.log_high.exp()
-        between = scale * parts.m1 + (loc - pivot) * parts.m0
-        return pivot + on_bounds + between
+        median = torch.clamp(loc, low, high).detach()
+        on_bounds = (low - median) * parts.log_low.exp() + (high - median) * parts.log_high.exp()
+        return median, on_bounds + scale * parts.m1 + (loc - median) * parts.m0
 
     def _moments(self, parts: _Parts) -> tuple[Tensor, Tensor]:
         """Return E[s − c] and E[(s − c)²] of s = (a − loc)/scale, with the standardised median as the pivot c."""

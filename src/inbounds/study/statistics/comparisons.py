@@ -119,6 +119,8 @@ def welch_freedom(parts: Sequence[ArrayLike], sizes: Sequence[int]) -> Floats:
     Example:
         >>> round(float(welch_freedom([0.5, 0.5], [10, 10])), 9), float(welch_freedom([0.5, 0.0], [10, 7]))
         (18.0, 9.0)
+        >>> float(welch_freedom([0.0, 0.0], [10, 7]))
+        15.0
     """
     variance = np.asarray(sum(np.asarray(part, float) for part in parts))
     squares = sum(np.asarray(part, float) ** 2 / (n - 1) for part, n in zip(parts, sizes, strict=True))
