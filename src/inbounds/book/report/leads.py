@@ -96,9 +96,9 @@ def leads(outcomes: Outcomes) -> Shown:
         return html.of_study(what, html.NONE_FINISHED)
     panels = {name: _bars(found, endpoint) for endpoint, name in ENDPOINTS.items()}
     alt = f"Law minus Gaussian with 95 percent intervals, by the kind of start. {in_words(panels)}"
-    lent = any(lead.start == "both quiet" and lead.study == 1 for lead in found)
+    stands_in = any(lead.start == "both quiet" and lead.study == 1 for lead in found)
     stand_ins = (
-        " (hollow: cells of the first study, in which the law may have its usual start)" if lent else ""
+        " (hollow: cells of the first study, in which the law may have its usual start)" if stands_in else ""
     )
     caption = (
         "Law minus Gaussian, where that is found above 0 from the usual starts. Bars: 95 % bootstrap intervals, not "
