@@ -750,8 +750,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "a variance is weighted once",
         "study/statistics/printed.py",
-        "np.array([w**2 * x.var",
-        "np.array([abs(w) * x.var",
+        "[w**2 * x.var",
+        "[abs(w) * x.var",
         "tests/study/test_ledger.py::test_a_weight_scales_a_group",
     ),
     Mutant(
