@@ -174,6 +174,20 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/distributions/test_clipped_normal.py::test_the_tails_of_the_masses",
     ),
     Mutant(
+        "a variance trusts a rounded mean",
+        "distributions/clipped_normal.py",
+        "median, shift = self._from_median(parts)\n        below",
+        "median, shift = self._mean(parts), 0.0\n        below",
+        "tests/distributions/test_clipped_normal.py::test_variance_does_not_cancel",
+    ),
+    Mutant(
+        "the mean of a clipped Normal is deaf to its location",
+        "distributions/clipped_normal.py",
+        " + (loc - median) * parts.m0",
+        " + (loc - median).detach() * parts.m0",
+        "tests/distributions/test_clipped_normal.py::test_the_variance_has_its_own_slope",
+    ),
+    Mutant(
         "the atoms are scored as density",
         "distributions/clipped_normal.py",
         "return torch.where(is_low, on_low, torch.where(is_high, on_high, between))",
@@ -746,6 +760,13 @@ MUTANTS: tuple[Mutant, ...] = (
         "side(gap, -1 if claimed else 1, -edge)",
         "side(gap, -1 if claimed else 1)",
         "tests/study/test_ledger.py::test_a_loss_matters_beyond_the_margin",
+    ),
+    Mutant(
+        "degrees of freedom count the mean",
+        "study/statistics/comparisons.py",
+        "np.asarray(part, float) ** 2 / (n - 1)",
+        "np.asarray(part, float) ** 2 / n",
+        "tests/book/explorer/test_picked_seeds.py::test_every_report_is_welch_s",
     ),
     Mutant(
         "a variance is weighted once",
