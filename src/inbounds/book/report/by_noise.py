@@ -12,7 +12,7 @@ from inbounds.study.second import PAIRS, Pair, compared, pooled_difference
 from inbounds.study.statistics import Comparison, Estimate
 from inbounds.study.words import spoken, verdict
 
-__all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change", "column"]
+__all__ = ["BOUNDED", "NOISES", "ROBOTS", "against_gaussian", "by_noise", "change", "column", "told"]
 
 NOISES = (0.2, 0.4, 0.55)
 """Executed noise before training, in units of half the range."""
@@ -76,7 +76,7 @@ def by_noise(outcomes: Outcomes) -> Shown:
     for robot in ROBOTS:
         found = {noise: [tests[law, noise][robot] for law in BOUNDED] for noise in NOISES}
         rows += [
-            [f"{robot}, {noise:g}", *map(_told, here)]
+            [f"{robot}, {noise:g}", *map(told, here)]
             for noise, here in found.items()
             if any(test.difference is not None for test in here)
         ]
@@ -91,7 +91,8 @@ def by_noise(outcomes: Outcomes) -> Shown:
     return html.of_study("the laws by their first noise", html.table(caption, head, rows), *strip)
 
 
-def _told(found: Comparison) -> str:
+def told(found: Comparison) -> str:
+    """Return a test's difference and, below it, its verdict; "not run" where a cell is missing."""
     if found.difference is None:
         return "not run"
     word = graded(verdict(found), found.difference)
