@@ -153,7 +153,7 @@ def test_the_laws_by_noise(tmp_path) -> None:
     for pair in second.PAIRS["other noise"]:
         noise, law = float(pair.first.variant.removeprefix("noise-")), pair.first.family
         test = second.compared(both, pair, "final")["Hopper"]
-        assert by_noise.against_gaussian(outcomes, law, noise, "Hopper") == test
+        assert by_noise.against_gaussian(outcomes, law, noise)["Hopper"] == test
         (row,) = (row for row in rows if row[0] == f"Hopper, {noise:g}")
         assert together(spoken(test.difference)) in row[1 if law == "beta" else 2]
     column = Column("equal", "ppo", "beta")

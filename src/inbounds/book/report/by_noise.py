@@ -50,8 +50,8 @@ def change(outcomes: Outcomes, law: str, noise: float, robot: str) -> Estimate |
     return pooled_difference(with_second(outcomes), column(law, noise), column(law, 0.4), robot, "final")
 
 
-def against_gaussian(outcomes: Outcomes, law: str, noise: float, robot: str) -> Comparison:
-    """Return the test of a law's final return minus the Gaussian's, both with a noise, its σ of the state.
+def against_gaussian(outcomes: Outcomes, law: str, noise: float) -> dict[str, Comparison]:
+    """Return the tests of a law's final return minus the Gaussian's, both with a noise, its σ of the state, by robot.
 
     Holm's correction is over the robots on which the pair is planned, those that are not run included.
 
@@ -59,9 +59,8 @@ def against_gaussian(outcomes: Outcomes, law: str, noise: float, robot: str) -> 
         outcomes: of either study.
         law: beta or logit-normal.
         noise: one of `NOISES`.
-        robot: a robot of `ROBOTS`.
     """
-    return compared(with_second(outcomes), _pair(law, noise), "final")[robot]
+    return compared(with_second(outcomes), _pair(law, noise), "final")
 
 
 def by_noise(outcomes: Outcomes) -> Shown:
@@ -70,8 +69,7 @@ def by_noise(outcomes: Outcomes) -> Shown:
     Args:
         outcomes: of either study.
     """
-    both = with_second(outcomes)
-    tests = {(law, noise): compared(both, _pair(law, noise), "final") for law in BOUNDED for noise in NOISES}
+    tests = {(law, noise): against_gaussian(outcomes, law, noise) for law in BOUNDED for noise in NOISES}
     rows, lacking = [], []
     for robot in ROBOTS:
         found = {noise: [tests[law, noise][robot] for law in BOUNDED] for noise in NOISES}
