@@ -105,6 +105,12 @@ def test_the_variance_of_a_wide_normal_is_that_of_its_two_bounds(log_scale: floa
     assert float(p.stddev) <= 1
 
 
+def test_a_variance_that_underflows_is_not_negative() -> None:
+    """The mean, measured from the median, rounds to beyond the bound."""
+    p = ClippedNormal(*double(33239.0133117, 103.72177499225704, -6849.676638220001, 29250.404897409775))
+    assert float(p.variance) >= 0
+
+
 @few
 @given(locs, log_scales, intervals())
 def test_mean_and_variance_against_quadrature(

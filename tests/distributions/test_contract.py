@@ -306,6 +306,12 @@ def test_bad_parameters_are_refused(family: Family, which: int) -> None:
         parameters[which][1] = bad
         with pytest.raises(ValueError, match=f"parameter {name}"):
             family.law(*parameters)
+    for infinite in [torch.inf, -torch.inf] if name == "loc" else [torch.inf]:
+        parameters = [p.clone() for p in family.parameters((3,))]
+        parameters[which][1] = infinite
+        with pytest.raises(ValueError, match=f"{name} must be finite.*clip what feeds it"):
+            family.law(*parameters)
+        family.law(*parameters, validate_args=False)  # the reader's own risk
 
 
 def test_shapes_that_do_not_broadcast_are_named(family: Family) -> None:

@@ -148,9 +148,8 @@ def test_impossible_rules_are_refused(rule, arguments: tuple[float, ...]) -> Non
 
 
 def test_a_rule_of_whole_numbers_is_refused() -> None:
-    for rule in (trapezoid, gauss_hermite):
-        with pytest.raises(ValueError, match=r"floating type, and not of torch\.int64"):
-            rule(5, dtype=torch.int64)
+    with pytest.raises(ValueError, match=r"floating type, and not of torch\.int64"):
+        trapezoid(5, dtype=torch.int64)
     with pytest.raises(ValueError, match=r"floating type, and not of torch\.int64"):
         graded_trapezoid(torch.tensor(0), torch.tensor(1))
 

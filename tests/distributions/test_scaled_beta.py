@@ -208,7 +208,10 @@ def test_without_parameters_there_is_no_mode() -> None:
 def test_from_mode_refuses_what_is_no_mode() -> None:
     with pytest.raises(ValueError, match="the mode must lie within"):
         ScaledBeta.from_mode(1.5, 2.0, -1.0, 1.0)
-    with pytest.raises(ValueError, match="must not be negative"):
+    for concentration in (-0.1, torch.inf):
+        with pytest.raises(ValueError, match=r"must be finite and not negative, got.*clip it"):
+            ScaledBeta.from_mode(0.5, concentration)
+    with pytest.raises(ValueError, match="must be finite and not negative"):
         ScaledBeta.from_mode(0.5, torch.tensor([1.0, -2.0]), -1.0, 1.0)
     for low, high, wrong in (
         (1.0, 1.0, "less than high"),

@@ -141,6 +141,21 @@ def test_episodes_go_on_from_one_rollout_to_the_next() -> None:
     assert [returns[0] for returns in second.episode_returns] == pytest.approx(across)
 
 
+def test_a_seed_of_a_rollout_is_a_copy() -> None:
+    rollout = collector().collect(30)
+    one = rollout.seed(-1)
+    assert torch.equal(one.obs, rollout.obs[2:])
+    assert one.episode_returns == rollout.episode_returns[2:]
+    before = rollout.saturation.copy(), rollout.action_std.copy(), rollout.obs.clone()
+    for array in (one.saturation, one.action_std, one.obs):
+        array[:] = -1
+    assert rollout.saturation.tolist() == before[0].tolist()
+    assert rollout.action_std.tolist() == before[1].tolist()
+    assert torch.equal(rollout.obs, before[2])
+    with pytest.raises(IndexError, match="no seed 3: choose one of the 3"):
+        rollout.seed(3)
+
+
 def test_a_poisoned_seed_holds_still() -> None:
     rollout = collector("beta", poisoned=(1,)).collect(30)
     assert torch.isnan(rollout.latent[1]).all()

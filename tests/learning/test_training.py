@@ -1,3 +1,4 @@
+import contextlib
 import copy
 import dataclasses
 import enum
@@ -428,6 +429,45 @@ def test_preparing_closes_what_it_makes_and_speaks_of_no_run(monkeypatch: pytest
     assert closed == [True]
 
 
+class Closing(PointEnv):
+    """It counts how often it is closed."""
+
+    closed = 0
+
+    def close(self, **kwargs: Any) -> None:
+        self.closed += 1
+
+
+@pytest.mark.parametrize("where", ["the constructor", "the run directory", "the callback", "nowhere"])
+def test_an_error_closes_the_environments(where: str, tmp_path: Path) -> None:
+    made: list[Closing] = []
+
+    def make(n: int) -> Closing:
+        made.append(Closing(n + (where == "the constructor")))
+        return made[-1]
+
+    def stop(*_: Any) -> None:
+        if where == "the callback":
+            raise ValueError(where)
+
+    if where == "the run directory":
+        (tmp_path / checkpoint.FILE_NAME).touch()
+    raised = True
+    with contextlib.suppress(ValueError):
+        train(small_config(epochs=1), run_dir=tmp_path, make_envs=make, callback=stop)
+        raised = False
+    assert raised == (where != "nowhere")
+    assert [envs.closed for envs in made] == [int(raised)]
+
+
+def test_what_a_killed_run_left_beside_its_checkpoint_is_removed(tmp_path: Path) -> None:
+    others = (".checkpoint.pt.0123abcd.partial.txt", ".other.pt.0123abcd.partial", "checkpoint.pt.partial")
+    for name in (".checkpoint.pt.0123abcd.partial", *others):
+        (tmp_path / name).touch()
+    train(small_config(epochs=1), run_dir=tmp_path, make_envs=PointEnv)
+    assert {file.name for file in tmp_path.iterdir()} == {checkpoint.FILE_NAME, *others}
+
+
 # ---- records, divergence, configuration
 
 
@@ -465,6 +505,16 @@ def test_an_exploding_seed_is_marked_when_it_explodes() -> None:
         warnings.simplefilter("error")
         record = trainer.epoch()  # reported once
     assert record["diverged"].tolist() == [False, False, True]
+
+
+def test_a_reward_too_large_for_the_networks_is_named_as_such() -> None:
+    class Generous(PointEnv):
+        def step(self, actions: Any) -> Any:
+            obs, reward, *rest = super().step(actions)
+            return obs, reward * 1e300, *rest
+
+    with pytest.warns(DivergedSeedWarning, match="no finite number, or one too large for float32"):
+        Trainer(small_config(normalize_obs=False), Generous).epoch()
 
 
 def test_a_warning_that_is_an_error_loses_nothing() -> None:
@@ -547,6 +597,7 @@ def test_presets_are_the_table() -> None:
     [
         (lambda: preset("commom"), "choose common or as-printed"),
         (lambda: preset("common", algo="sac"), "choose one of ppo, trpo"),
+        (lambda: preset("common", algo=["ppo"]), r"no algorithm \['ppo'\]; choose one of ppo, trpo"),
         (lambda: preset("common", policy="normal"), "choose one of gaussian"),
         (lambda: preset("common", seeds=-1), "asks for -1 of them; at least 1"),
         (lambda: TrainConfig(seeds=()), "seeds must be different"),

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import threading
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from inbounds.learning.networks.adam import SeedAdam, clip_gradients
 from inbounds.learning.networks.perceptron import initialize_pytorch
 from inbounds.learning.updates.diagnostics import diagnose
 from inbounds.learning.updates.minibatches import minibatches
+from inbounds.learning.updates.threads import one_thread
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES, rng, small_config, small_run
 
@@ -180,3 +182,34 @@ def test_diagnostics_are_those_of_two_known_laws() -> None:
     assert torch.allclose(found["approx_kl"], (log_ratio.exp() - 1 - log_ratio).mean(1))
     assert torch.allclose(found["entropy"], new.entropy().sum())
     assert not torch.isclose(kl_divergence(old, new).sum(), kl_divergence(new, old).sum(), rtol=0.1)
+
+
+def test_overlapping_uses_of_one_thread_leave_as_many_as_there_were() -> None:
+    """The second begins within the first and ends after it; a thread begun later has torch's number of the last end."""
+    before, inside, over = torch.get_num_threads(), threading.Event(), threading.Event()
+    found: list[int] = []
+
+    def second() -> None:
+        with one_thread(), one_thread():
+            inside.set()
+            over.wait(60)
+            found.append(torch.get_num_threads())
+        found.append(torch.get_num_threads())
+
+    torch.set_num_threads(3)
+    try:
+        other = threading.Thread(target=second)
+        with one_thread():
+            other.start()
+            inside.wait(60)
+            assert torch.get_num_threads() == 1
+        assert torch.get_num_threads() == 3
+        over.set()
+        other.join()
+        later = threading.Thread(target=lambda: found.append(torch.get_num_threads()))
+        later.start()
+        later.join()
+    finally:
+        over.set()
+        torch.set_num_threads(before)
+    assert found == [1, 3, 3]

@@ -230,6 +230,8 @@ def test_actions_that_are_not_finite_are_named():
     raw.reset(seed=0)
     with pytest.raises(ValueError, match="not finite"):
         raw.step(np.full((1, 6), np.inf))
+    _, reward, *_ = envs.step(np.full((4, 6), np.inf))  # clipped, and paid as clipped
+    assert np.isfinite(reward).all()
 
 
 # ── Errors ───────────────────────────────────────────────────────────────────────────────────────────────────

@@ -13,18 +13,19 @@ Floating point is the enemy near a bound, and three rules answer it:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
-from torch.distributions import Distribution, constraints
+from torch.distributions import Distribution, Normal, constraints
 
 from inbounds.distributions.open_interval import OpenInterval, from_line, open_ends, to_line
 
 __all__ = [
     "BoundedDistribution",
+    "NormalLatent",
     "SigmoidMapped",
     "TensorLike",
     "as_parameters",
@@ -47,8 +48,8 @@ class BoundedDistribution(Distribution):
         **parameters: `[...]` each; numbers, tensors or arrays that broadcast together, `low` and `high` among them.
 
     Raises:
-        ValueError: shapes that do not broadcast; under validation also a parameter outside its constraint, bounds
-            that are infinite, NaN or out of order, or that leave no floating-point number between them.
+        ValueError: shapes that do not broadcast; under validation also a parameter outside its constraint or infinite,
+            bounds that are infinite, NaN or out of order, or that leave no floating-point number between them.
 
     Example:
         >>> from inbounds.distributions import LogitNormal, ScaledBeta
@@ -67,6 +68,15 @@ class BoundedDistribution(Distribution):
         if validate_args if validate_args is not None else self._validate_args:
             _check_bounds(type(self).__name__, self.low, self.high)
         super().__init__(self.low.shape, validate_args=validate_args)
+        if self._validate_args:
+            self._check_finite()
+
+    def _check_finite(self) -> None:
+        for name in self.arg_constraints:  # torch takes infinity for a real number; bounds have been checked
+            if not torch._is_all_true(getattr(self, name).isfinite()):  # as torch checks, also under vmap
+                raise ValueError(
+                    f"{type(self).__name__}: {name} must be finite, got {getattr(self, name)}: clip what feeds it"
+                )
 
     def expand(self, batch_shape: Any, _instance: Any = None) -> Self:
         """Return this distribution with its parameters expanded to `batch_shape` (no memory is copied)."""
@@ -137,6 +147,27 @@ class BoundedDistribution(Distribution):
                 "from a value that was rounded or clipped, or pass validate_args=False: outside the support log_prob "
                 "is then -inf."
             ) from None
+
+
+class NormalLatent(BoundedDistribution):
+    """Base of the laws whose latent is z ~ Normal(loc, scale)."""
+
+    arg_constraints: ClassVar[dict[str, constraints.Constraint]] = {
+        "loc": constraints.real,
+        "scale": constraints.positive,
+        "low": constraints.dependent,
+        "high": constraints.dependent,
+    }
+    has_rsample = True
+    loc: Tensor
+    scale: Tensor
+
+    def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
+        """Return latents z = loc + scale·ε, `[*sample_shape, ...]`; store these in a rollout, not the values."""
+        return self.loc + self.scale * self._standard_normal(sample_shape, generator)
+
+    def _normal(self) -> Normal:
+        return Normal(self.loc, self.scale, validate_args=False)
 
 
 class SigmoidMapped(BoundedDistribution):

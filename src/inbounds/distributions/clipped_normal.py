@@ -20,21 +20,21 @@ returned in the type of the parameters.
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
-from torch.distributions import Normal, constraints, register_kl
+from torch.distributions import constraints, register_kl
 from torch.distributions.kl import _kl_normal_normal
 from torch.special import log_ndtr
 
-from inbounds.distributions.bounds import BoundedDistribution, TensorLike, require_equal_bounds
+from inbounds.distributions.bounds import NormalLatent, TensorLike, require_equal_bounds
 from inbounds.distributions.standard_normal import normal_quantile, standard_normal_cdf, standard_normal_pdf
 
 __all__ = ["ClippedNormal", "gaussian_kl_upper_bound"]
 
 
-class ClippedNormal(BoundedDistribution):
+class ClippedNormal(NormalLatent):
     r"""Law of min(max(z, low), high) for z ~ Normal(loc, scale); elementwise over broadcast parameters.
 
     **Edges of the support.** The support is the closed interval: a bound is a value like any other, and the most
@@ -65,16 +65,6 @@ class ClippedNormal(BoundedDistribution):
         0.1587
     """
 
-    arg_constraints: ClassVar[dict[str, constraints.Constraint]] = {
-        "loc": constraints.real,
-        "scale": constraints.positive,
-        "low": constraints.dependent,
-        "high": constraints.dependent,
-    }
-    has_rsample = True
-    loc: Tensor
-    scale: Tensor
-
     def __init__(
         self,
         loc: TensorLike,
@@ -90,11 +80,7 @@ class ClippedNormal(BoundedDistribution):
         """The closed interval [low, high]."""
         return constraints.interval(self.low, self.high)
 
-    # ---- the latent, and the map that forgets it
-
-    def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
-        """Return unclipped z = loc + scale·ε, `[*sample_shape, ...]`."""
-        return self.loc + self.scale * self._standard_normal(sample_shape, generator)
+    # ---- the map that forgets the latent (which is drawn by NormalLatent)
 
     def latent_to_value(self, latent: Tensor) -> Tensor:
         """Return min(max(latent, low), high), `[...]`."""
@@ -178,7 +164,7 @@ class ClippedNormal(BoundedDistribution):
         median, shift = self._from_median(parts)
         below, above = median - low + shift, high - median - shift
         quarter = ((high - low) / 2).square()
-        most = torch.minimum(below * above, quarter)
+        most = torch.minimum(below * above, quarter).clamp(min=0)  # a mean beyond a bound, by rounding
         least = (most - quarter * parts.m0).clamp(min=0)
         return torch.minimum(torch.maximum(variance, least), most).to(self.low.dtype)
 
@@ -197,9 +183,6 @@ class ClippedNormal(BoundedDistribution):
         return self.median
 
     # ---- helpers
-
-    def _normal(self) -> Normal:
-        return Normal(self.loc, self.scale, validate_args=False)
 
     def _log_prob_inside(self, value: Tensor) -> Tensor:
         is_low, is_high = value == self.low, value == self.high

@@ -23,15 +23,15 @@ The law has two modes iff σ² > 2 and |μ| < σ²k − 2 artanh k with k = √(
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 import torch
 from torch import Tensor
-from torch.distributions import Normal, constraints, register_kl
+from torch.distributions import register_kl
 from torch.distributions.kl import _kl_normal_normal
 from torch.nn.functional import logsigmoid
 
-from inbounds.distributions.bounds import SigmoidMapped, TensorLike, require_equal_bounds
+from inbounds.distributions.bounds import NormalLatent, SigmoidMapped, TensorLike, require_equal_bounds
 from inbounds.distributions.quadrature import expectation, graded_trapezoid
 from inbounds.distributions.standard_normal import normal_quantile, standard_normal_cdf
 
@@ -40,7 +40,7 @@ __all__ = ["LogitNormal"]
 _NEWTON_STEPS = 60  # quadratic, but for the cusp (μ = 0, σ² = 2), where each step only takes a third off
 
 
-class LogitNormal(SigmoidMapped):
+class LogitNormal(NormalLatent, SigmoidMapped):
     r"""Law of low + (high − low) · sigmoid(z) for z ~ Normal(loc, scale); elementwise over broadcast parameters.
 
     **Edges of the support.** The support is the open interval. `log_prob` and `cdf` of a value on a bound or beyond
@@ -73,16 +73,6 @@ class LogitNormal(SigmoidMapped):
         (torch.Size([1000, 2]), True)
     """
 
-    arg_constraints: ClassVar[dict[str, constraints.Constraint]] = {
-        "loc": constraints.real,
-        "scale": constraints.positive,
-        "low": constraints.dependent,
-        "high": constraints.dependent,
-    }
-    has_rsample = True
-    loc: Tensor
-    scale: Tensor
-
     def __init__(
         self,
         loc: TensorLike,
@@ -93,11 +83,7 @@ class LogitNormal(SigmoidMapped):
     ) -> None:
         super().__init__(loc=loc, scale=scale, low=low, high=high, validate_args=validate_args)
 
-    # ---- the latent (its bijection with the value: SigmoidMapped)
-
-    def rsample_latent(self, sample_shape: Any = (), generator: torch.Generator | None = None) -> Tensor:
-        """Return latents z = loc + scale·ε, `[*sample_shape, ...]`; store these in a rollout, not the values."""
-        return self.loc + self.scale * self._standard_normal(sample_shape, generator)
+    # ---- the latent (drawn by NormalLatent; its bijection with the value: SigmoidMapped)
 
     def log_prob_latent(self, latent: Tensor) -> Tensor:
         """Return log p(a) in nats at a = latent_to_value(latent): the density over *values*, read off the latent.
@@ -204,9 +190,6 @@ class LogitNormal(SigmoidMapped):
         return (variance > 2) & (self.loc.abs() < reach)
 
     # ---- helpers
-
-    def _normal(self) -> Normal:
-        return Normal(self.loc, self.scale, validate_args=False)
 
     def _expect(self, function: Any) -> Tensor:
         return expectation(function, self.loc, self.scale, graded_trapezoid(self.loc, self.scale))

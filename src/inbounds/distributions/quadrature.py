@@ -71,12 +71,7 @@ def expectation(function: Callable[[Tensor], Tensor], loc: Tensor, scale: Tensor
     return (rule.weights * function(latent)).sum(-1)
 
 
-def trapezoid(
-    num_nodes: int = 101,
-    half_width: float = 8.5,
-    dtype: torch.dtype = torch.float64,
-    device: torch.device | str = "cpu",
-) -> Rule:
+def trapezoid(num_nodes: int = 101, half_width: float = 8.5, dtype: torch.dtype = torch.float64) -> Rule:
     """Return the trapezoid rule on ±half_width standard deviations.
 
     The end nodes carry half a step, and so little of the Normal's mass that nobody will ever know.
@@ -85,7 +80,6 @@ def trapezoid(
         num_nodes: number of nodes N, at least 2.
         half_width: where the line is cut, in standard deviations; P(|x| > 8.5) is 2e-17.
         dtype: floating type of the rule.
-        device: device of the rule.
 
     Returns:
         A rule with `[N]` nodes and weights.
@@ -100,7 +94,7 @@ def trapezoid(
     """
     _check_trapezoid(num_nodes, half_width)
     _check_floating(dtype)
-    nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype, device=device)
+    nodes = torch.linspace(-half_width, half_width, num_nodes, dtype=dtype)
     step = 2 * half_width / (num_nodes - 1)
     weights = step * standard_normal_pdf(nodes)
     weights[[0, -1]] /= 2
@@ -123,15 +117,11 @@ def _check_floating(dtype: torch.dtype) -> None:
 _MOST_HERMITE_NODES = 370
 
 
-def gauss_hermite(
-    num_nodes: int = 101, dtype: torch.dtype = torch.float64, device: torch.device | str = "cpu"
-) -> Rule:
+def gauss_hermite(num_nodes: int = 101) -> Rule:
     """Return the Gauss-Hermite rule: exact where function is a polynomial of degree below 2 num_nodes.
 
     Args:
         num_nodes: number of nodes N, from 1 to 370: with more, NumPy's weights underflow.
-        dtype: floating type of the rule.
-        device: device of the rule.
 
     Returns:
         A rule with `[N]` nodes and weights.
@@ -149,12 +139,8 @@ def gauss_hermite(
             f"the Gauss-Hermite rule needs num_nodes from 1 to {_MOST_HERMITE_NODES}, got {num_nodes}"
             + (": take the trapezoid rule" if num_nodes > 1 else "")
         )
-    _check_floating(dtype)
     nodes, weights = np.polynomial.hermite_e.hermegauss(num_nodes)  # weight function exp(−x²/2)
-    return Rule(
-        torch.as_tensor(nodes, dtype=dtype, device=device),
-        torch.as_tensor(weights / math.sqrt(2 * math.pi), dtype=dtype, device=device),
-    )
+    return Rule(torch.as_tensor(nodes), torch.as_tensor(weights / math.sqrt(2 * math.pi)))
 
 
 @torch.no_grad()

@@ -113,7 +113,7 @@ class ScaledBeta(SigmoidMapped):
             validate_args: check parameters and values.
 
         Raises:
-            ValueError: under validation, a mode outside the bounds or a negative concentration.
+            ValueError: under validation, a mode outside the bounds or a concentration that is negative or infinite.
 
         Example:
             >>> law = ScaledBeta.from_mode(0.5, 8.0, low=-1.0, high=1.0)
@@ -131,9 +131,11 @@ class ScaledBeta(SigmoidMapped):
                 raise ValueError(
                     f"the mode must lie within [low, high], got {mode}: clip it or move the bounds"
                 )
-            if not torch._is_all_true(given["concentration"] >= 0):
+            concentrations = given["concentration"]
+            if not torch._is_all_true((concentrations >= 0) & concentrations.isfinite()):
                 raise ValueError(
-                    f"the concentration must not be negative, got {concentration}: use softplus or exp on what feeds it"
+                    f"the concentration must be finite and not negative, got {concentration}: use softplus or exp on "
+                    "what feeds it, and clip it"
                 )
         per_length = given["concentration"] / (high - low)
         return cls(1 + per_length * towards_high, 1 + per_length * towards_low, low, high, validate_args)

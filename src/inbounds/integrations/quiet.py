@@ -40,7 +40,7 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
 
     def executed(log_scale: float) -> float:
         loc, scale = torch.tensor([0.0, math.exp(log_scale)], dtype=torch.float64)
-        return law(loc, scale, -1.0, 1.0).variance.sqrt().item()
+        return law(loc, scale, -1.0, 1.0).stddev.item()
 
     least, most = map(executed, _LOG_SCALES)
     if not least < std < most:

@@ -134,7 +134,7 @@ def preset(
         >>> config.algorithm.clip_range, config.network.initialization, config.seeds
         (0.02, 'pytorch', (0, 1, 2))
     """
-    if algo not in ALGORITHMS:
+    if algo not in tuple(ALGORITHMS):  # a list has no hash
         raise ValueError(f"no algorithm {algo!r}; choose one of {', '.join(ALGORITHMS)}")
     several = (
         isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes) and getattr(seeds, "ndim", 1) == 1

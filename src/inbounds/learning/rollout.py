@@ -7,7 +7,7 @@ the rollout, from whole arrays. The environments must reset within the step that
 
 from __future__ import annotations
 
-import dataclasses
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from inbounds.learning.families.family import Parameters
 from inbounds.learning.families.policy import SATURATION_MARGIN, ActionMode
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.networks.normalizer import RunningNormalizer
+from inbounds.learning.networks.perceptron import row_of_seed
 from inbounds.learning.seeding import SeedStreams, generator_states, restore_generators
 
 if TYPE_CHECKING:  # numba is an extra
@@ -77,16 +78,14 @@ class Rollout:
         return self.reward.shape[1]
 
     def seed(self, index: int) -> Rollout:
-        """Return a copy of one seed's steps, S = 1."""
-        row = slice(index, index + 1)
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        tensors = {name: x[row].clone() for name, x in values.items() if isinstance(x, Tensor)}
-        return Rollout(
-            **values
-            | tensors
-            | {name: values[name][row] for name in ("saturation", "action_std", "episode_returns")}
-            | {"parameters": self.parameters.each(lambda x: x[row].clone())}
-        )
+        """Return a copy of one seed's steps, S = 1; an IndexError where there are fewer seeds (−1 is the last)."""
+        row = row_of_seed(index, self.num_seeds)
+        values = dict(vars(self))
+        parameters = values.pop("parameters").each(lambda x: x[row].clone())
+        for name, value in values.items():
+            own = value[row]
+            values[name] = own.clone() if isinstance(own, Tensor) else copy.deepcopy(own)
+        return Rollout(**values, parameters=parameters)
 
     def advantages(self, gamma: float, gae_lambda: float) -> tuple[Tensor, Tensor]:
         """Return advantages and returns, `[S, T]` each: `gae` of this rollout."""

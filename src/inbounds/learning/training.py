@@ -19,7 +19,7 @@ import contextlib
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -39,7 +39,8 @@ from inbounds.learning.seeding import SeedStreams, generator_states, restore_gen
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
-from inbounds.learning.storage.whole_files import held
+from inbounds.learning.storage.whole_files import held, remove_leftovers
+from inbounds.learning.updates.diagnostics import episode_statistics
 from inbounds.learning.updates.engine import compiled_engine
 from inbounds.learning.updates.threads import one_thread
 from inbounds.robots.registration import TASK_NAMES
@@ -84,24 +85,27 @@ class Trainer:
         self.streams = [SeedStreams.of(seed) for seed in config.seeds]
         num_seeds = len(config.seeds)
         self.envs = make_envs(num_seeds) if make_envs else make_environments(config, num_seeds)
-        check_environments(self.envs, num_seeds, config.action_mode)
-        box: Any = self.envs.single_action_space
-        policy = Policy(config.policy, box.low, box.high)
-        self._compiled = compiled_engine(policy.family) if config.engine == "compiled" else None
-        obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
-        generators = [stream.initialization for stream in self.streams]
-        with one_thread():  # orthogonal initial weights depend on the number of threads, in their last bits
-            self.networks = ActorCritic(policy, obs_dim, config.network, generators)
-        self._algorithm = ALGORITHMS[config.algorithm_name][1]
-        make_optimizer, acting = self._algorithm.make_optimizer, None
-        if self._compiled is not None:
-            acting = self._compiled.CompiledActing(self.networks)
-            self.optimizer = self._compiled.SeedBySeed(self.networks, make_optimizer, config.algorithm)
-        else:
-            self.optimizer = make_optimizer(self.networks, config.algorithm)
-        self.collector = Collector(
-            self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode, acting
-        )
+        with contextlib.ExitStack() as on_error:
+            on_error.callback(getattr(self.envs, "close", lambda: None))  # no environments may have none
+            check_environments(self.envs, num_seeds, config.action_mode)
+            box: Any = self.envs.single_action_space
+            policy = Policy(config.policy, box.low, box.high)
+            self._compiled = compiled_engine(policy.family) if config.engine == "compiled" else None
+            obs_dim = gymnasium.spaces.flatdim(self.envs.single_observation_space)
+            generators = [stream.initialization for stream in self.streams]
+            with one_thread():  # the last bits of orthogonal initial weights depend on the number of threads
+                self.networks = ActorCritic(policy, obs_dim, config.network, generators)
+            self._algorithm = ALGORITHMS[config.algorithm_name][1]
+            make_optimizer, acting = self._algorithm.make_optimizer, None
+            if self._compiled is not None:
+                acting = self._compiled.CompiledActing(self.networks)
+                self.optimizer = self._compiled.SeedBySeed(self.networks, make_optimizer, config.algorithm)
+            else:
+                self.optimizer = make_optimizer(self.networks, config.algorithm)
+            self.collector = Collector(
+                self.envs, self.networks, self.streams, config.normalize_obs, config.action_mode, acting
+            )
+            on_error.pop_all()
         self.rollout: Rollout | None = None
         """What the last epoch learned from."""
         self.records: list[Record] = []
@@ -153,8 +157,8 @@ class Trainer:
             (now & received, "train with a smaller learning_rate"),
             (
                 now & ~received,
-                "mend the environment, which has returned an observation or a reward that is no finite number "
-                "(gymnasium.utils.env_checker.check_env looks for more)",
+                "mend the environment, which has returned an observation or a reward that is no finite number, or one "
+                f"too large for {self.config.network.dtype} (gymnasium.utils.env_checker.check_env looks for more)",
             ),
         ):
             if new.any():
@@ -254,7 +258,8 @@ def train(
         callback: called after every epoch with the trainer and the record: a progress bar, a logger.
 
     Returns:
-        The trainer, its run finished, with `records`, `networks`, `diverged`, `collector`.
+        The trainer, its run finished, with `records`, `networks`, `diverged`, `collector`. Its `envs` are open; where
+        an error is raised, they are closed.
 
     Raises:
         ValueError: the run directory is of another configuration, or its checkpoint damaged (`DamagedFileError`).
@@ -270,7 +275,8 @@ def train(
     """
     folder = None if run_dir is None else Path(run_dir).absolute()  # an environment may change the directory
     trainer = Trainer(config, make_envs)
-    with contextlib.ExitStack() as stack:
+    with contextlib.ExitStack() as stack, contextlib.ExitStack() as on_error:
+        on_error.callback(trainer.envs.close)
         path = None
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
@@ -281,6 +287,7 @@ def train(
                     f"another process or thread trains in {folder}: wait until it is done, or choose another run_dir"
                 ) from error
             path = folder / checkpoint.FILE_NAME
+            remove_leftovers(path)
             if path.exists():
                 trainer.load_state_dict(checkpoint.load(path))
             checkpoint.require_keepable(trainer.state_dict())
@@ -290,6 +297,7 @@ def train(
                 checkpoint.save(path, trainer.state_dict())
             if callback is not None:
                 callback(trainer, record)
+        on_error.pop_all()
     return trainer
 
 
@@ -335,12 +343,3 @@ def make_environments(config: TrainConfig, num_envs: int) -> Environments:
         return SyncVectorEnv(
             [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
         )
-
-
-def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
-    """Return, per seed, the number of episodes that ended and the mean of their returns (NaN where none did)."""
-    returns: Sequence[Sequence[float]] = rollout.episode_returns
-    return {
-        "episodes": np.array([len(r) for r in returns]),
-        "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
-    }

@@ -204,6 +204,7 @@ def record(
         TypeError: the environment has no MuJoCo simulation.
         IndexError: there is no robot of that index.
         ValueError: a film of no length or no size.
+        MemoryError: a film that is too long or too large.
 
     Example:
         >>> import gymnasium
@@ -222,8 +223,12 @@ def record(
     stride = max(1, math.ceil(1 / (max_fps * step_time) - 1e-9))
     num_frames = max(1, round(seconds / (stride * step_time)))
     obs, _ = env.reset(seed=seed)
-    frames, total_reward = np.empty((num_frames, height, width, 3), np.uint8), 0.0
+    total_reward = 0.0
     with RobotRenderer(env, index=index, width=width, height=height, camera=camera) as renderer:
+        try:
+            frames = np.empty((num_frames, height, width, 3), np.uint8)
+        except ValueError as error:  # NumPy's, where no address is so long
+            raise MemoryError(f"{seconds:g} s of {width} × {height} pixels: {error}") from error
         for step in range(num_frames * stride):
             if step % stride == 0:
                 frames[step // stride] = renderer.frame()

@@ -152,7 +152,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
             that of `SyncVectorEnv` with `SAME_STEP`.
 
         Raises:
-            ValueError: actions of the wrong shape, or not finite.
+            ValueError: actions of the wrong shape, or NaN; in the mode "raw" infinite ones, too, which "clip" clips.
             gymnasium.error.ResetNeeded: before the first reset.
         """
         if self._obs is None:

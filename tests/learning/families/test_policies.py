@@ -168,6 +168,12 @@ def test_initial_std_is_the_executed_standard_deviation(family: str, std: float)
     assert measured == pytest.approx(std, rel=0.05)
 
 
+@pytest.mark.parametrize("scale", [1e17, 1e155, 1.7e308])
+@pytest.mark.parametrize("family", ["gaussian", "clipped-gaussian", "logit-normal"])
+def test_the_widest_laws_are_on_the_bounds(family: str, scale: float) -> None:
+    assert executed_std(family, scale) == 1
+
+
 def test_executed_std_is_that_of_the_public_distributions() -> None:
     for s in (0.05, 0.5, 2.0):
         assert executed_std("gaussian", s) == pytest.approx(ClippedNormal(0.0, s).stddev.item(), rel=1e-5)
@@ -192,11 +198,20 @@ def test_the_executed_std_of_a_logit_normal_is_an_integral(scale: float) -> None
     [
         (lambda: PolicyConfig("normal"), "no policy family 'normal'; choose one of gaussian"),
         (lambda: executed_std("cauchy", 1.0), "no policy family 'cauchy'; choose one of gaussian"),
+        (lambda: PolicyConfig(["beta"]), r"no policy family \['beta'\]; choose one of gaussian"),
+        (lambda: executed_std("gaussian", math.inf), "a scale must be positive and finite, got inf"),
+        (lambda: executed_std("gaussian", math.nan), "a scale must be positive and finite, got nan"),
         (lambda: PolicyConfig("beta", state_dependent_std=False), "no scale"),
         (lambda: head_bias(PolicyConfig("beta", initial_std=0.7)), "between 0.07"),
         (lambda: head_bias(PolicyConfig("gaussian", initial_std=1.2)), "out of reach"),
-        (lambda: Policy(PolicyConfig("beta"), LOW, np.array([np.inf, 1.0])), "finite bounds"),
-        (lambda: Policy(PolicyConfig("beta"), HIGH, LOW), "must be below"),
+        (lambda: Policy(PolicyConfig("beta"), LOW, np.array([np.inf, 1.0])), "bounds must be finite"),
+        (lambda: Policy(PolicyConfig("beta"), HIGH, LOW), "low must be less than high.*Swap the bounds"),
+        (lambda: Policy(PolicyConfig("beta"), [-1.7e308], [1.7e308]), "length overflows"),
+        (
+            lambda: Policy(PolicyConfig("beta"), *np.float32([[1e8], [1e8 + 8]])),
+            "Use float64, or move the interval",
+        ),
+        (lambda: Policy(PolicyConfig("beta"), np.zeros(0), np.zeros(0)), "A at least 1"),
         (lambda: Policy(PolicyConfig("beta"), LOW[None], HIGH[None]), "one-dimensional Box"),
     ],
 )

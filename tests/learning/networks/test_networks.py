@@ -167,6 +167,9 @@ def test_named_tensors_rebuild_the_network() -> None:
         {"hidden_sizes": 64},
         {"initialization": "xavier"},
         {"dtype": "float16"},
+        {"dtype": ["float32"]},
+        {"policy_head_gain": "0.1"},
+        {"value_head_gain": math.inf},
     ],
     ids=str,
 )
@@ -196,3 +199,17 @@ def test_a_copied_optimiser_trains_the_copied_network() -> None:
     assert not torch.equal(twin.theta, before)
     assert np.allclose(twin.act(obs[:, 0].numpy()), twin(obs)[:, 0].detach().numpy(), rtol=1e-5)
     assert torch.equal(pickle.loads(pickle.dumps(twin.seed(1))).theta, twin.theta[1:])
+
+
+def test_a_seed_may_be_counted_from_the_end_and_must_be_there() -> None:
+    for nets in (network(), actor_critic(PolicyConfig("gaussian"))):
+        assert weights_of(nets.seed(-1)).tolist() == weights_of(nets)[-1:].tolist()
+        for wrong in (len(weights_of(nets)), -1 - len(weights_of(nets))):
+            with pytest.raises(
+                IndexError, match=f"no seed {wrong}: choose one of the {len(weights_of(nets))}, from 0"
+            ):
+                nets.seed(wrong)
+
+
+def weights_of(nets: Mlp | ActorCritic) -> torch.Tensor:
+    return nets.theta if isinstance(nets, Mlp) else nets.actor.theta

@@ -337,6 +337,7 @@ def test_a_configuration_survives_its_file(algo: str, name: str, tmp_path: Path)
     ("change", "said"),
     [
         ({"format": 2}, "format 2: update inbounds"),
+        ({"format": "2"}, "format '2', which is no number: inbounds did not write it"),
         ({"config": {"gain": 2.0}}, r"inbounds 9\.9 wrote the file.*'gain'.*update inbounds"),
         (
             {"config": {"algorithm_name": "rocket"}},

@@ -117,6 +117,8 @@ def in_box(parameters: NormalParameters, low: Tensor, high: Tensor) -> tuple[Ten
 
 def clipped_std(scale: float) -> float:
     """Return the standard deviation of a centred Normal after a clip to [−1, 1]."""
+    if scale > 1e150:  # whose square may overflow; long before, all mass is on the bounds
+        return 1.0
     bound = min(1 / scale, 1e150)  # E[u²] = σ² E[ε²; |ε| < 1/σ] + P(|ε| > 1/σ)
     outside = math.erfc(bound / math.sqrt(2))
     density = math.exp(-(bound**2) / 2) / math.sqrt(2 * math.pi)

@@ -13,6 +13,8 @@ every state; under PyTorch's default initialisation it is right on average only.
 
 from __future__ import annotations
 
+import math
+
 from inbounds.learning.families.policy import PolicyConfig, family_of
 
 
@@ -27,14 +29,14 @@ def executed_std(family: str, scale: float) -> float:
         The standard deviation, in units of half the action range; below 1, where all mass is on the bounds.
 
     Raises:
-        ValueError: no family of that name, or a scale that is not positive.
+        ValueError: no family of that name, or a scale that is not positive and finite.
 
     Example:
         >>> [round(executed_std(f, 1.0), 4) for f in ("gaussian", "logit-normal", "beta")]
         [0.7184, 0.4166, 0.5774]
     """
-    if not scale > 0:
-        raise ValueError(f"a scale must be positive, got {scale}")
+    if not 0 < scale < math.inf:
+        raise ValueError(f"a scale must be positive and finite, got {scale}")
     return family_of(family).executed_std(scale)
 
 

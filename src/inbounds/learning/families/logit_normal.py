@@ -89,6 +89,8 @@ def squashed_std(scale: float) -> float:
 
     Beyond the default limit of σ by the public law, whose rule is finer where the squash is a step to the plain one.
     """
+    if scale > 1e16:  # 1 − 0.8/scale rounds to 1; the rule has lost its digits, and later overflows
+        return 1.0
     if scale > math.e:
         return float(LogitNormal(torch.zeros((), dtype=torch.float64), scale, -1.0, 1.0).stddev)
     nodes, weights = (x.numpy() for x in trapezoid())

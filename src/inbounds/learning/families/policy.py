@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.distributions import Distribution
 
+from inbounds.distributions.bounds import require_bounds
 from inbounds.learning.families import beta, clipped_gaussian, gaussian, logit_normal
 from inbounds.learning.families.family import Array, Family, Limits, Parameters
 from inbounds.learning.updates.checks import check
@@ -47,7 +48,7 @@ def family_of(name: str) -> Family:
     Raises:
         ValueError: there is none.
     """
-    if name not in FAMILIES:
+    if name not in tuple(FAMILIES):  # a list has no hash
         raise ValueError(f"no policy family {name!r}; choose one of {', '.join(FAMILIES)}")
     return FAMILIES[name]
 
@@ -94,7 +95,8 @@ class Policy:
         high: `[A]` upper bounds.
 
     Raises:
-        ValueError: the bounds are not finite or not in order.
+        ValueError: the bounds are not of shape [A], not finite, not in order, or too close for a number of their type
+            between them, or too far apart for the type.
 
     Example:
         >>> policy = Policy(PolicyConfig("logit-normal"), low=np.array([-2.0]), high=np.array([4.0]))
@@ -108,13 +110,12 @@ class Policy:
     def __init__(self, config: PolicyConfig, low: NDArray[Any], high: NDArray[Any]) -> None:
         self.dtype = np.result_type(np.asarray(low), np.float16)  # of executed actions, the box's
         low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
-        if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low) & np.isfinite(high)).all():
+        if low.ndim != 1 or low.shape != high.shape or not low.size:
             raise ValueError(
-                f"a policy needs finite bounds of shape [A], got low={low.tolist()}, high={high.tolist()}: "
+                f"a policy needs bounds of shape [A], A at least 1, got low={low.tolist()}, high={high.tolist()}: "
                 "wrap the environment so that its action space is a bounded, one-dimensional Box"
             )
-        if not (low < high).all():
-            raise ValueError(f"low must be below high, got low={low.tolist()}, high={high.tolist()}")
+        require_bounds(low, high, getattr(torch, self.dtype.name, torch.float64))
         self.config = config
         self.family = FAMILIES[config.family]
         self.law = self.family.law

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from inbounds.learning.networks.perceptron import (
     initialize_pytorch,
     mlp,
 )
+from inbounds.learning.updates.checks import check
 
 DTYPES = {"float32": torch.float32, "float64": torch.float64}
 
@@ -57,11 +57,9 @@ class NetworkConfig:
             raise ValueError(f"hidden_sizes needs positive numbers of units, got {self.hidden_sizes}")
         if self.initialization not in ("pytorch", "orthogonal"):
             raise ValueError(f"initialization must be pytorch or orthogonal, got {self.initialization!r}")
-        if self.dtype not in DTYPES:
+        if self.dtype not in tuple(DTYPES):  # a list has no hash
             raise ValueError(f"dtype must be float32 or float64, got {self.dtype!r}")
-        for name in ("policy_head_gain", "value_head_gain"):
-            if not math.isfinite(gain := getattr(self, name)):
-                raise ValueError(f"{name} must be a finite number, got {gain}")
+        check(self, finite=("policy_head_gain", "value_head_gain"))
 
 
 class ActorCritic:
@@ -122,7 +120,11 @@ class ActorCritic:
         return len(self.actor.theta)
 
     def seed(self, index: int) -> Self:
-        """Return the two networks of one seed, S = 1, which have their weights in common with these."""
+        """Return the two networks of one seed, S = 1, which have their weights in common with these.
+
+        Raises:
+            IndexError: there are fewer seeds; negative indices count from the end.
+        """
         one = copy.copy(self)
         one.actor, one.critic = self.actor.seed(index), self.critic.seed(index)
         return one

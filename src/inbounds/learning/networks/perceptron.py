@@ -143,8 +143,12 @@ class Mlp:
         return _with_weights, (type(self), self.sizes, self.theta.clone())
 
     def seed(self, index: int) -> Self:
-        """Return the perceptron of one seed, S = 1, which has its weights in common with these."""
-        row, one = slice(index, index + 1), object.__new__(type(self))
+        """Return the perceptron of one seed, S = 1, which has its weights in common with these.
+
+        Raises:
+            IndexError: there are fewer seeds; negative indices count from the end.
+        """
+        row, one = row_of_seed(index, len(self.theta)), object.__new__(type(self))
         one.__dict__.update(self.__dict__)
         one.padded, one.theta = self.padded[row], self.theta[row]
         one.padded.grad = None if self.padded.grad is None else self.padded.grad[row]
@@ -181,6 +185,24 @@ class Mlp:
         }
 
 
+def row_of_seed(index: int, num_seeds: int) -> slice:
+    """Return the slice of one row of S, that of a seed; negative indices count from the end.
+
+    Raises:
+        IndexError: there are fewer seeds.
+
+    Example:
+        >>> row_of_seed(-1, 3)
+        slice(2, 3, None)
+    """
+    if not -num_seeds <= index < num_seeds:
+        raise IndexError(
+            f"there is no seed {index}: choose one of the {num_seeds}, from 0 to {num_seeds - 1}"
+        )
+    start = index % num_seeds
+    return slice(start, start + 1)
+
+
 def flatten(tensors: Sequence[Tensor]) -> Tensor:
     """Return one row `[S, P]` per seed of what is shaped like the parameters of an `Mlp`."""
     return torch.cat([tensor.flatten(1) for tensor in tensors], 1)
@@ -197,10 +219,8 @@ def initialize_pytorch(net: Mlp, generators: Sequence[torch.Generator]) -> None:
 
 
 @torch.no_grad()
-def initialize_orthogonal(
-    net: Mlp, generators: Sequence[torch.Generator], head_gain: float, gain: float = math.sqrt(2)
-) -> None:
-    """Make each seed's weights orthogonal (Saxe et al. 2014) and its biases zero.
+def initialize_orthogonal(net: Mlp, generators: Sequence[torch.Generator], head_gain: float) -> None:
+    """Make each seed's weights orthogonal (Saxe et al. 2014), with the gain √2 below the last layer; its biases zero.
 
     Seed by seed: `torch.nn.init.orthogonal_` takes a three-dimensional tensor for one flattened matrix.
 
@@ -208,12 +228,11 @@ def initialize_orthogonal(
         net: the networks, changed in place.
         generators: one per seed.
         head_gain: of the last layer; small, it makes the first policy the same in every state.
-        gain: of the layers before.
     """
     for s, generator in enumerate(generators):
         for i, layer in enumerate(net.layers):
-            last = i == len(net.layers) - 1
-            torch.nn.init.orthogonal_(layer.weight[s], head_gain if last else gain, generator=generator)
+            gain = head_gain if i == len(net.layers) - 1 else math.sqrt(2)
+            torch.nn.init.orthogonal_(layer.weight[s], gain, generator=generator)
             layer.bias[s].zero_()
 
 

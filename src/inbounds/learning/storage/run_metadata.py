@@ -64,8 +64,8 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
         metadata: the parsed JSON.
 
     Raises:
-        ValueError: it is of no run, or another version of the package wrote it, with options that this one does not
-            know.
+        ValueError: it is of no run, of a format that is no number, or another version of the package wrote it, with
+            options that this one does not know.
 
     Example:
         >>> from inbounds.learning import preset
@@ -75,6 +75,10 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
     """
     if not {"format", "config"} <= metadata.keys():
         raise ValueError("the file is of no run: it has no configuration of one")
+    if not isinstance(metadata["format"], int | float):
+        raise ValueError(
+            f"the file has format {metadata['format']!r}, which is no number: inbounds did not write it"
+        )
     if metadata["format"] > FORMAT:
         raise ValueError(f"the file has format {metadata['format']}: update inbounds to read it")
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import secrets
 import shlex
 from collections.abc import Iterator
@@ -124,6 +125,28 @@ def write_whole(path: Path, data: Any) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)  # on a full disk every byte counts
         raise
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what `write_whole` left beside a file whenever it was killed; nobody else may be writing that file.
+
+    Args:
+        path: of the file; its folder must exist.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     leftover = Path(folder) / ".file.0123abcd.partial"
+        ...     leftover.touch()
+        ...     remove_leftovers(Path(folder) / "file")
+        ...     leftover.exists()
+        False
+    """
+    name = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.partial")
+    for leftover in path.parent.iterdir():
+        if name.fullmatch(leftover.name):
+            with contextlib.suppress(OSError):  # it takes room, and does no other harm
+                leftover.unlink()
 
 
 @contextlib.contextmanager

@@ -20,6 +20,7 @@ def check(
     not_negative: Sequence[str] = (),
     unit: Sequence[str] = (),
     positive_or_none: Sequence[str] = (),
+    finite: Sequence[str] = (),
 ) -> None:
     """Raise a ValueError that names the first field out of range, or the first of another type.
 
@@ -29,6 +30,7 @@ def check(
         not_negative: of fields that must be ≥ 0.
         unit: of fields that must lie in [0, 1].
         positive_or_none: of fields that must be > 0, or None.
+        finite: of fields that may have any sign.
 
     Example:
         >>> from types import SimpleNamespace
@@ -47,6 +49,7 @@ def check(
         (not_negative, "not be negative", lambda x: x >= 0),
         (unit, "lie in [0, 1]", lambda x: 0 <= x <= 1),
         (positive_or_none, "be positive, or None", lambda x: x is None or x > 0),
+        (finite, "be a finite number", math.isfinite),
     )
     for names, rule, holds in rules:
         for name in names:

@@ -1,7 +1,8 @@
-"""What an update did to a policy, measured on the rollout that it learned from."""
+"""What an update did to a policy, measured on the rollout that it learned from, and what that rollout earned."""
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -35,3 +36,12 @@ def diagnose(networks: ActorCritic, rollout: Rollout, return_: Tensor) -> tuple[
         "explained_variance": 1 - residual.var(1) / return_.var(1),
     }
     return diagnostics, ratio
+
+
+def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
+    """Return, per seed, the number of episodes that ended and the mean of their returns (NaN where none did)."""
+    returns = rollout.episode_returns
+    return {
+        "episodes": np.array([len(r) for r in returns]),
+        "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
+    }
