@@ -73,6 +73,21 @@ def test_a_grader_that_is_not_shown_is_not_reached(tmp_path: Path) -> None:
     assert [row[1] for row in graded(path)] == ["not reached"]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="sets a limit of Linux")
+@pytest.mark.parametrize("hard", [5, 7], ids=["below --gigabytes", "above"])
+def test_a_limit_that_the_shell_has_set_is_not_raised(hard: int) -> None:
+    """As `ulimit -d` does, for whatever the shell starts."""
+    script = (
+        "from resource import RLIMIT_DATA, getrlimit, setrlimit\n"
+        "from inbounds.cli.classroom.student import limit_memory\n"
+        f"setrlimit(RLIMIT_DATA, 2 * ({hard}_000_000_000,))\n"
+        "limit_memory(6)\n"
+        "print(*getrlimit(RLIMIT_DATA))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == 2 * [str(min(6, hard) * 10**9)], done.stderr
+
+
 @pytest.mark.slow
 def test_every_mark_is_that_of_its_own_exercise(tmp_path: Path) -> None:
     """A cell that raises, or calls a grader without showing it, moves no other exercise's mark."""

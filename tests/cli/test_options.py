@@ -5,12 +5,13 @@ import sys
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import inbounds
-from inbounds.cli import options
+from inbounds.cli import options, studying
 from inbounds.learning import FAMILIES, NetworkConfig, PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
 from inbounds.learning.families import Limits
@@ -169,6 +170,41 @@ def test_output_that_has_no_room_is_told_in_a_line(words: str) -> None:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr == "inbounds: the disk is full (where the output goes): make room, and run it again\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "worker"),
+    [
+        ("run standard-swimmer-ppo-beta", "run_study"),
+        ("evaluate standard-swimmer-ppo-beta", "evaluate_cells"),
+        ("ledger centres", "judge"),
+        ("verify standard-swimmer-ppo-beta", "verify"),
+    ],
+)
+def test_only_a_wrong_command_line_is_called_one(
+    words: str, worker: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An array of the wrong shape, hours into a study, needs its traceback."""
+
+    def add(*_args: object, **_more: object) -> None:
+        np.zeros(2) + np.zeros(3)
+
+    monkeypatch.setattr(studying, worker, add)
+    where = ("--results", tmp_path, "--work", tmp_path)
+    with pytest.raises(ValueError, match="could not be broadcast"):
+        run("study", *words.split(), *where)
+    wrong = ("--rerun", "nonsense") if words.startswith("verify") else ("nonsense",)
+    code, out, err = run("study", words.split()[0], *wrong, *where)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"inbounds study: no {'claim' if worker == 'judge' else 'cell matches'} nonsense")
+
+
+@pytest.mark.parametrize("words", [["study", "dial"], ["study", "dial", "run", "--help"]], ids=" ".join)
+def test_the_dial_has_examples_of_its_own(words: list[str]) -> None:
+    _, examples = succeeds(words).split("\nexamples:\n")
+    assert all(line.startswith("  inbounds study dial ") for line in examples.splitlines())
+    assert examples not in succeeds(["study", "--help"])
+    assert examples not in succeeds(["--help"])
 
 
 def test_the_version() -> None:

@@ -1,3 +1,4 @@
+import dataclasses
 import errno
 import os
 import signal
@@ -15,7 +16,7 @@ from rich.console import Console
 
 from inbounds.cli import main, options
 from inbounds.cli.progress import TrainingProgress
-from inbounds.cli.training import STEP_SIZE
+from inbounds.cli.training import step_sizes
 from inbounds.learning import Trainer
 from inbounds.learning.config import ALGORITHMS
 from inbounds.learning.storage import checkpoint
@@ -135,11 +136,21 @@ def test_the_return_of_a_seed_is_the_last_one_known() -> None:
 @pytest.mark.parametrize("algo", ALGORITHMS)
 def test_the_remedy_of_divergence_is_an_option_of_the_algorithm(algo: str, tmp_path: Path) -> None:
     chosen = [] if algo == "ppo" else ["--algo", algo]
-    for option in STEP_SIZE[algo]:
+    sizes = step_sizes(ALGORITHMS[algo][0])
+    assert sizes[-1] == "--algorithm.learning-rate"
+    for option in sizes:
         options.parse(["train", "Hopper-v5", *chosen, option, "0.001"])
     code, _, err = run(*small(tmp_path / "run", 2, "Hopper-v5", *chosen), "--algorithm.learning-rate", "1e30")
     assert code == 1
-    assert f"train with a smaller {' or '.join(STEP_SIZE[algo])} in another --out" in err
+    assert f"train with a smaller {' or '.join(sizes)} in another --out" in err
+
+
+def test_an_algorithm_of_tomorrow_has_its_remedy_of_divergence() -> None:
+    fields = [("gamma", float), ("learning_rate", float), ("max_kl", float)]
+    assert step_sizes(dataclasses.make_dataclass("Config", fields)) == [
+        "--algorithm.max-kl",
+        "--algorithm.learning-rate",
+    ]
 
 
 def test_speed_and_time_left_are_those_of_the_epochs_seen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 
 import inbounds
-from inbounds.cli.errors import CommandError, is_unread
+from inbounds.cli.errors import CommandError, complain, is_unread
 
 __all__ = ["main"]
 
@@ -37,6 +37,11 @@ EXAMPLES = {
   inbounds study report --out report.html
   inbounds study verify --random 2 --epochs 20
   inbounds study dial --help      (a task with three knobs: when does the law matter?)""",
+    "study dial": """\
+  inbounds study dial run            (about ten minutes of one core; goes on where it stopped)
+  inbounds study dial status
+  inbounds study dial show
+  inbounds study dial verify --random 2""",
     "doctor": """\
   inbounds doctor""",
     "grade": """\
@@ -77,8 +82,7 @@ def main(args: Sequence[str] | None = None) -> int:
             raise
         _write_no_more()
         where = error.filename or "where the output goes"
-        print(f"inbounds: the disk is full ({where}): make room, and run it again", file=sys.stderr)
-        return 1
+        return complain(f"the disk is full ({where}): make room, and run it again")
 
 
 def _write_no_more() -> None:
@@ -119,26 +123,27 @@ def _run(args: list[str]) -> int:
         if is_unread(exit_):
             raise
         if parsed:  # an environment's, or its module's
-            print(f"inbounds: the environment ended the process: sys.exit({exit_.code!r})", file=sys.stderr)
-            return exit_.code if exit_.code and isinstance(exit_.code, int) else 1
-        if exit_.code == 0 and args[:2] != ["study", "dial"]:  # which has examples of its own
-            examples = EXAMPLES.get(next(iter(args), ""), "\n".join(EXAMPLES.values()))
-            print(f"\nexamples:\n{examples}")
+            code = exit_.code if exit_.code and isinstance(exit_.code, int) else 1
+            return complain(f"the environment ended the process: sys.exit({exit_.code!r})", code)
+        if exit_.code == 0:
+            print(f"\nexamples:\n{_examples(args)}")
         return exit_.code if isinstance(exit_.code, int) else 1
     except CommandError as error:
-        print(f"inbounds: {error}", file=sys.stderr)
-        return error.exit_code
+        return complain(error, error.exit_code)
     except BackendError as error:
-        print(f"inbounds: {error}", file=sys.stderr)
-        return 1
+        return complain(error)
     except OSError as error:
         if error.errno != errno.ENAMETOOLONG:
             raise
-        print(
-            f"inbounds: a name is too long for the disk ({error.filename}): choose a shorter one",
-            file=sys.stderr,
-        )
-        return 2
+        return complain(f"a name is too long for the disk ({error.filename}): choose a shorter one", 2)
+
+
+def _examples(args: list[str]) -> str:
+    """Return those of the command that the words name, else one command's after another."""
+    for words in (2, 1):
+        if (name := " ".join(args[:words])) in EXAMPLES:
+            return EXAMPLES[name]
+    return "\n".join(text for name, text in EXAMPLES.items() if " " not in name)
 
 
 def _doctor() -> int:
@@ -146,8 +151,5 @@ def _doctor() -> int:
         from inbounds.cli.classroom import doctor
     except ModuleNotFoundError as error:  # what it looks and prints with
         package = (error.name or "").partition(".")[0]
-        print(
-            f"inbounds: the package {package} is missing: pip install . in the source tree", file=sys.stderr
-        )
-        return 1
+        return complain(f"the package {package} is missing: pip install . in the source tree")
     return doctor.run()

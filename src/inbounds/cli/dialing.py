@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, Union
+from typing import TypeAlias
 
-import tyro
-from rich.console import Console
-from tyro.conf import subcommand
-
-from inbounds.cli.errors import CommandError
+from inbounds.cli.commands import Lines, read_one_of
+from inbounds.cli.errors import CommandError, complain
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.dial.cells import EPOCHS, dial_cells
 from inbounds.study.dial.outcomes import DialOutcomes, constant_guess, tally
@@ -20,11 +17,8 @@ from inbounds.study.dial.running import DialFolder, run_cells, wrong_cells
 from inbounds.study.dial.theory import MODELS
 from inbounds.study.words import spoken
 
-EXAMPLES = """\
-  inbounds study dial run            (about ten minutes of one core; goes on where it stopped)
-  inbounds study dial status
-  inbounds study dial show
-  inbounds study dial verify --random 2"""
+PROG = "inbounds study dial"
+DESCRIPTION = "The dial: when does the law matter? A map over three knobs, fixed in results/DIAL.md."
 
 
 @dataclass(frozen=True)
@@ -89,35 +83,15 @@ def dial(args: Sequence[str]) -> int:
         no folder no/results here: the source tree has one with the map (--results)
         0
     """
-    read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
-    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
-    console = Console(highlight=False, force_jupyter=False)
+    command: DialCommand = read_one_of(COMMANDS, args, PROG, DESCRIPTION)
     try:
-        command: DialCommand = read(
-            Union[kinds],  # noqa: UP007
-            args=list(args) or ["--help"],
-            prog="inbounds study dial",
-            description="The dial: when does the law matter? A map over three knobs, fixed in results/DIAL.md.",
-        )
-    except SystemExit as exit_:
-        if exit_.code == 0:
-            print(f"\nexamples:\n{EXAMPLES}")
-        raise
-    try:
-        return _do(command, console)
+        return _do(command, Lines().say)
     except (DamagedFileError, OSError) as error:
-        Console(stderr=True, highlight=False).print(
-            f"inbounds study dial: {error}", markup=False, soft_wrap=True
-        )
-        return 1
+        return complain(error, prog=PROG)
 
 
-def _do(command: DialCommand, console: Console) -> int:
+def _do(command: DialCommand, say: Callable[[str], None]) -> int:
     folder, cells = command.folder(), dial_cells()
-
-    def say(line: str) -> None:
-        console.print(line, markup=False, soft_wrap=True)
-
     if isinstance(command, Run):
         whole = run_cells(cells, folder, say)
         say(f"map: {folder.map_file}" if whole else "the same command goes on with the others")
@@ -144,7 +118,7 @@ def _do(command: DialCommand, console: Console) -> int:
     return 0
 
 
-def _show(outcomes: DialOutcomes, say: Any) -> None:
+def _show(outcomes: DialOutcomes, say: Callable[[str], None]) -> None:
     findings = outcomes.findings
     for finding in findings:
         knobs = finding.setting

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import traceback
 
 
@@ -11,6 +12,12 @@ class CommandError(Exception):
     def __init__(self, message: str, exit_code: int = 1) -> None:
         super().__init__(message)
         self.exit_code = exit_code
+
+
+def complain(message: object, exit_code: int = 1, prog: str = "inbounds") -> int:
+    """Write a line to standard error, and return the exit code."""
+    print(f"{prog}: {message}", file=sys.stderr)
+    return exit_code
 
 
 def is_ours(error: BaseException) -> bool:

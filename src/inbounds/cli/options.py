@@ -8,13 +8,13 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, Union
+from typing import Annotated, Any, Literal, TypeAlias
 
-import tyro
 from tyro import MISSING_NONPROP
-from tyro.conf import AvoidSubcommands, Positional, arg, subcommand
+from tyro.conf import AvoidSubcommands, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
+from inbounds.cli.commands import read, read_one_of
 from inbounds.cli.errors import CommandError
 from inbounds.learning import PolicyConfig, TrainConfig, preset
 from inbounds.learning.config import ALGORITHMS
@@ -247,10 +247,8 @@ def parse(args: Sequence[str]) -> Command:
         ('Hopper-v5', (0, 1), 0.02)
     """
     name, rest = (args[0], args[1:]) if args and args[0] in COMMANDS else (None, args)
-    read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
     if name is None:  # help, or no command of that name
-        kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
-        read(Union[kinds], args=rest or ["--help"], prog="inbounds", description=DESCRIPTION)  # noqa: UP007
+        read_one_of(COMMANDS, rest, "inbounds", DESCRIPTION)
         raise AssertionError("tyro accepts no command line without a command")
     default = _train_defaults(rest) if name == "train" else MISSING_NONPROP
     command: Command = read(

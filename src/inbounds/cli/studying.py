@@ -7,15 +7,15 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeAlias, Union
+from typing import Annotated, Any, Self, TypeAlias
 
-import tyro
-from rich.console import Console
-from tyro.conf import Positional, arg, subcommand
+from tyro.conf import Positional, arg
 
+from inbounds.cli.commands import Lines, blaming_the_words, read_one_of
+from inbounds.cli.errors import CommandError, complain
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.grid import Cell, all_cells, select
-from inbounds.study.ledger import claims_named, judge, quotes
+from inbounds.study.ledger import Claim, claims_named, judge, quotes
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running.attempts import Settings
 from inbounds.study.running.check_ways import check_ways
@@ -27,15 +27,13 @@ from inbounds.study.running.progress import StudyProgress, cell_status, status_t
 from inbounds.study.running.verify import Checked, verify
 from inbounds.study.store import StudyFolder
 
+PROG = "inbounds study"
+DESCRIPTION = "The two studies of the book: algorithms, families and robots, ten seeds a cell."
 Cells: TypeAlias = Annotated[Positional[tuple[str, ...]], arg(metavar="[CELL ...]")]
 
 
 @dataclass(frozen=True)
-class _Where:
-    cells: Cells = ()
-    """Which: arms (standard, printed, beyond, mechanisms; the second study's equal, equal-more, as-they-come, noise,
-    steps; afterwards, of neither protocol), ids, or patterns like '*-hopper-ppo-*'; by default all of the first
-    protocol (status, evaluate and verify: all)."""
+class _Folders:
     results: Path = StudyFolder.results
     """Folder of the results."""
     work: Path = StudyFolder.work
@@ -44,6 +42,14 @@ class _Where:
     def folder(self) -> StudyFolder:
         """Return the two folders."""
         return StudyFolder(self.results, self.work)
+
+
+@dataclass(frozen=True)
+class _Where(_Folders):
+    cells: Cells = ()
+    """Which: arms (standard, printed, beyond, mechanisms; the second study's equal, equal-more, as-they-come, noise,
+    steps; afterwards, of neither protocol), ids, or patterns like '*-hopper-ppo-*'; by default all of the first
+    protocol (status, evaluate and verify: all)."""
 
     def chosen(self) -> tuple[Cell, ...]:
         """Return the cells.
@@ -98,15 +104,19 @@ class Report(_Where):
 
 
 @dataclass(frozen=True)
-class Ledger:
+class Ledger(_Folders):
     """Print what the finished cells say to claims of the source thesis, statement by statement."""
 
     claims: Annotated[Positional[tuple[str, ...]], arg(metavar="[CLAIM ...]")] = ()
     """Which, by their names in the ledger; by default all."""
-    results: Path = StudyFolder.results
-    """Folder of the results."""
-    work: Path = StudyFolder.work
-    """Folder of claims and checkpoints."""
+
+    def chosen(self) -> tuple[Claim, ...]:
+        """Return the claims.
+
+        Raises:
+            ValueError: there is none of such a name.
+        """
+        return claims_named(self.claims)
 
 
 @dataclass(frozen=True)
@@ -166,81 +176,70 @@ def study(args: Sequence[str]) -> int:
         from inbounds.cli.dialing import dial
 
         return dial(args[1:])
-    read: Any = tyro.cli  # its overloads do not know types that are chosen at run time
-    named = (*COMMANDS.items(), ("dial", Dial))  # which has a command line of its own, above
-    kinds: Any = tuple(Annotated[kind, subcommand(name)] for name, kind in named)
-    description = "The two studies of the book: algorithms, families and robots, ten seeds a cell."
-    console = Console(highlight=False, force_jupyter=False)
+    console = Lines()
     try:
-        command: StudyCommand = read(
-            Union[kinds],  # noqa: UP007
-            args=list(args) or ["--help"],
-            prog="inbounds study",
-            description=description,
-        )
-        if isinstance(command, Ledger | Verify | Report | Evaluate) and not command.results.is_dir():
-            raise ValueError(_no_folder(command.results))
+        with blaming_the_words():  # for no ValueError of what is done thereafter
+            command: StudyCommand = read_one_of(COMMANDS | {"dial": Dial}, args, PROG, DESCRIPTION)
+            if isinstance(command, Ledger | Verify | Report | Evaluate) and not command.results.is_dir():
+                raise ValueError(_no_folder(command.results))
+            chosen: Any = command.chosen()  # claims of the ledger, else cells
         if isinstance(command, Ledger):
-            return _ledger(command, console)
-        cells = command.chosen()
+            return _ledger(command, chosen, console)
         if isinstance(command, Run):
-            return _run(command, cells, console)
+            return _run(command, chosen, console)
         if isinstance(command, Status):
-            return _status(command, cells, console)
+            return _status(command, chosen, console)
         if isinstance(command, Evaluate):
-            return _evaluate(command, cells, console)
+            return _evaluate(command, chosen, console)
         if isinstance(command, Report):
-            return _report(command, cells, console)
-        return _verify(command, cells, console)
-    except DamagedFileError as error:
-        return _complain(str(error), 1)
-    except ValueError as error:
-        return _complain(str(error), 2)
-    except StudyError as error:
-        return _complain(str(error), 1)
+            return _report(command, chosen, console)
+        return _verify(command, chosen, console)
+    except CommandError as error:
+        return complain(error, error.exit_code, PROG)
+    except (DamagedFileError, StudyError) as error:
+        return complain(error, prog=PROG)
     except PermissionError as error:
-        return _complain(f"{error}: change its permissions, or choose other folders (--results, --work)", 1)
+        said = f"{error}: change its permissions, or choose other folders (--results, --work)"
+        return complain(said, prog=PROG)
     except OSError as error:
         if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
             raise
         said = f"{error}. What was finished is kept: make room, or choose other folders (--results, --work)"
-        return _complain(said, 1)
+        return complain(said, prog=PROG)
 
 
-def _run(command: Run, cells: Sequence[Cell], console: Console) -> int:
+def _run(command: Run, cells: Sequence[Cell], console: Lines) -> int:
     folder = command.folder()
     summary = run_study(cells, folder, command.settings, StudyProgress(cells, folder, console))
     finished = sum("finished" in report.outcome for report in summary.reports.values())
-    console.print(f"{finished} of {len(cells)} cells are finished", markup=False)
+    console.say(f"{finished} of {len(cells)} cells are finished")
     if finished < len(cells):
-        console.print("the same command goes on with the others", markup=False)
+        console.say("the same command goes on with the others")
     if summary.signal:
         return 128 + summary.signal
     return 1 if summary.failed else 0
 
 
-def _status(command: Status, cells: Sequence[Cell], console: Console) -> int:
+def _status(command: Status, cells: Sequence[Cell], console: Lines) -> int:
     if command.each:
         for cell in cells:
-            console.print(f"{cell.id}: {cell_status(cell, command.folder())}", markup=False, soft_wrap=True)
+            console.say(f"{cell.id}: {cell_status(cell, command.folder())}")
     else:
         if not command.results.is_dir():  # a cell may be under way all the same
-            console.print(_no_folder(command.results), markup=False, soft_wrap=True)
+            console.say(_no_folder(command.results))
         console.print(status_table(cells, command.folder()))
     return 0
 
 
-def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Console) -> int:
-    played = evaluate_cells(
-        cells, command.folder(), lambda line: console.print(line, markup=False, soft_wrap=True)
-    )
+def _evaluate(command: Evaluate, cells: Sequence[Cell], console: Lines) -> int:
+    played = evaluate_cells(cells, command.folder(), console.say)
     if publish_records(cells, command.folder()):
-        console.print("records: played", markup=False)
-    console.print(f"{len(played)} cell{'s' if len(played) != 1 else ''} played now", markup=False)
+        console.say("records: played")
+    console.say(f"{len(played)} cell{'s' if len(played) != 1 else ''} played now")
     return 0
 
 
-def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
+def _report(command: Report, cells: Sequence[Cell], console: Lines) -> int:
     try:
         from inbounds.book.report.study_report import write_report
     except ImportError as error:
@@ -254,15 +253,14 @@ def _report(command: Report, cells: Sequence[Cell], console: Console) -> int:
             path = write_report(outcomes, command.out, lambda section: now.say(f"writing: {section}"))
     except OSError as error:
         raise StudyError(f"{command.out} could not be written ({error}): choose another --out") from error
-    console.print(f"{len(outcomes.finished)} of {len(cells)} cells are finished", markup=False)
-    console.print(f"report: {path}", markup=False, soft_wrap=True)
+    console.say(f"{len(outcomes.finished)} of {len(cells)} cells are finished")
+    console.say(f"report: {path}")
     return 0
 
 
-def _ledger(command: Ledger, console: Console) -> int:
-    chosen = claims_named(command.claims)
-    outcomes = Outcomes.read(StudyFolder(command.results, command.work))
-    for claim in chosen:
+def _ledger(command: Ledger, claims: Sequence[Claim], console: Lines) -> int:
+    outcomes = Outcomes.read(command.folder())
+    for claim in claims:
         found = judge(outcomes, claim)
         lines = [
             f"{claim.id}: {quotes.verdict(found)} ({found.counted})",
@@ -280,20 +278,21 @@ def _ledger(command: Ledger, console: Console) -> int:
         lines += [
             f"  {name}: {state}, and so not used" for name, state in others.items() if state != "missing"
         ]
-        console.print("\n".join(lines), markup=False, soft_wrap=True)
+        console.say("\n".join(lines))
     return 0
 
 
-def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
+def _verify(command: Verify, cells: Sequence[Cell], console: Lines) -> int:
     def show(finding: Checked) -> None:
         mark = "ok" if finding.ok else "WRONG"
-        console.print(f"{mark:5} {finding.subject}: {finding.message}", markup=False, soft_wrap=True)
+        console.say(f"{mark:5} {finding.subject}: {finding.message}")
 
     if command.random < 0 or command.epochs < 1:
-        raise ValueError("--random takes 0 or more cells, and --epochs 1 or more")
+        raise CommandError("--random takes 0 or more cells, and --epochs 1 or more", 2)
     if command.random and command.rerun:
-        raise ValueError("--rerun names the cells and --random chooses them: give one of the two")
-    rerun = select(command.rerun, cells) if command.rerun else None
+        raise CommandError("--rerun names the cells and --random chooses them: give one of the two", 2)
+    with blaming_the_words():
+        rerun = select(command.rerun, cells) if command.rerun else None
     if command.random:
         finished = [cell for cell in cells if command.folder().state(cell) == "finished"]
         chooser = random.Random(command.random_seed)
@@ -307,7 +306,7 @@ def _verify(command: Verify, cells: Sequence[Cell], console: Console) -> int:
 class _Now:
     """What is being done, while it is done: a line that turns on a terminal, plain lines elsewhere."""
 
-    def __init__(self, console: Console, doing: str) -> None:
+    def __init__(self, console: Lines, doing: str) -> None:
         self._console, self._doing, self._status = console, doing, console.status(doing)
 
     def __enter__(self) -> Self:
@@ -322,13 +321,8 @@ class _Now:
         """Say what is done now."""
         self._status.update(doing)
         if not self._console.is_terminal:
-            self._console.print(doing, markup=False, soft_wrap=True)
+            self._console.say(doing)
 
 
 def _no_folder(results: Path) -> str:
     return f"no folder {results} here: go to the source tree, or name it with --results"
-
-
-def _complain(message: str, code: int) -> int:
-    Console(stderr=True, highlight=False).print(f"inbounds study: {message}", markup=False, soft_wrap=True)
-    return code

@@ -90,12 +90,18 @@ def run(command: Train) -> int:
         return _Session(command, config, run_dir, folder, room, has_state).run()
 
 
-STEP_SIZE = {
-    "ppo": ("--algorithm.learning-rate",),
-    "trpo": ("--algorithm.max-kl", "--algorithm.learning-rate"),
-    "policy-gradient": ("--algorithm.policy-learning-rate", "--algorithm.learning-rate"),
-}
-"""Algorithm → the options that decide how far an epoch moves the networks."""
+STEP_SIZES = ("policy_learning_rate", "max_kl", "learning_rate")
+"""What decides how far an epoch moves the networks, as far as an algorithm has it."""
+
+
+def step_sizes(algorithm: type[Any]) -> list[str]:
+    """Return the options that decide how far an epoch moves the networks.
+
+    Args:
+        algorithm: the class of its configuration.
+    """
+    fields = algorithm.__dataclass_fields__
+    return [f"--algorithm.{name.replace('_', '-')}" for name in STEP_SIZES if name in fields]
 
 
 class _Session:
@@ -188,9 +194,8 @@ class _Session:
 
     def _conclude(self, trainer: Trainer, start: int) -> int:
         if trainer.diverged.all():
-            slower = (
-                f"train with a smaller {' or '.join(STEP_SIZE[self.config.algorithm_name])} in another --out"
-            )
+            options = " or ".join(step_sizes(type(self.config.algorithm)))
+            slower = f"train with a smaller {options} in another --out"
             mended = (
                 "mend the environment, which has returned an observation or a reward that is no finite number"
             )

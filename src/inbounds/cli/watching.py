@@ -59,6 +59,9 @@ def run(command: Watch) -> int:
         raise
     except (gymnasium.error.Error, ImportError) as error:
         raise CommandError(f"{policy.config.env} cannot be made here: {error}") from error
+    except MemoryError as error:
+        fewer = "choose fewer --seconds, or a smaller --width and --height"
+        raise CommandError(f"there is no memory for such a film: {fewer}") from error
     except (ValueError, TypeError, RuntimeError) as error:
         if not is_ours(error):
             raise  # the environment's own

@@ -19,6 +19,9 @@ def limit_memory(gigabytes: float) -> None:
     except ImportError:
         return
     size = int(gigabytes * 1e9)
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    if hard != resource.RLIM_INFINITY:  # as under `ulimit -d`: nobody may raise it
+        size = min(size, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (size, size))
 
 
