@@ -79,6 +79,32 @@ def test_a_notebook_is_executed_once_and_a_failing_one_again(
 
 
 @pytest.mark.slow
+def test_who_reads_another_notebook_is_executed_again_when_that_has_changed(tree: Path) -> None:
+    names = ("first", "continues", "goes_on", "counts", "alone")
+    start = 'programs.start(globals(), "{}")'
+    files = [
+        write(tree, name, f"# {line}")
+        for name, line in zip(
+            names, ("", start.format("first"), start.format("continues"), "count_page(", ""), strict=True
+        )
+    ]
+
+    def executed() -> list[int]:
+        notebook_cache.fill("now")
+        return [len(file.read_text(encoding="utf8").split()) for file in files]
+
+    assert executed() == executed() == [1, 1, 1, 1, 1]
+    page = tree / "_build" / ".doctrees" / "notebooks" / "continues.doctree"
+    page.parent.mkdir(parents=True)
+    page.touch()
+    write(tree, "first", "# other")
+    assert executed() == executed() == [2, 2, 2, 2, 1]
+    assert not page.exists()
+    write(tree, "alone", "# other")
+    assert executed() == [2, 2, 2, 3, 2]
+
+
+@pytest.mark.slow
 def test_nothing_is_taken_out_of_a_cache_that_is_being_filled(
     tree: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,11 +1,14 @@
 """Notebooks executed once: the book shows what they put out (`make book`), nbval compares it (`make test`).
 
 Jupyter's cache knows an executed notebook by its cells alone. A chapter also depends on the package, the data and the
-pinned versions, so a cache lives in a folder named by a digest of those: change one and every notebook runs again.
+pinned versions, so a cache lives in a folder named by a digest of those: change one and every notebook runs again. And
+some read other notebooks while they run (`read_of_others`): they run again when one of those has changed.
 """
 
 import hashlib
+import json
 import os
+import re
 import shutil
 import sys
 import threading
@@ -19,15 +22,8 @@ AT_ONCE = min(4, os.cpu_count() or 1)  # notebooks; each takes one core and up t
 CODE = (
     "src",
     "results",
-    "benchmarks/contestants.py",
-    "benchmarks/equivalence.py",
-    "benchmarks/report.py",
-    "benchmarks/validate.py",
-    "benchmarks/results/engines/ppo-logit-normal/engines.json",
-    "benchmarks/results/live.json",
-    "benchmarks/results/speed.json",
-    "benchmarks/results/validation/curves.parquet",
-    "benchmarks/results/validation/validation.json",
+    "benchmarks",
+    "_toc.yml",
     "constraints.txt",
     "pyproject.toml",
 )
@@ -44,6 +40,24 @@ def digest(*names: str) -> str:
             if path.is_file() and "__pycache__" not in inside and not any(p.startswith(".") for p in inside):
                 total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
     return total.hexdigest()[:16]
+
+
+def read_of_others(path: Path) -> str:
+    """Return a digest of the notebooks that a notebook reads while it runs, nothing where it reads none.
+
+    One that continues a program reads the chapters before it; one that counts pages reads all.
+    """
+
+    def earlier(notebook: Path) -> list[Path]:
+        text = notebook.read_text(encoding="utf8")
+        names = re.findall(r'programs\.start\(globals\(\), \\"(\w+)\\"', text)
+        found = [notebook.with_name(f"{name}.ipynb") for name in names]
+        return [*found, *(each for one in found for each in earlier(one))]
+
+    if "count_page(" in path.read_text(encoding="utf8"):
+        return digest("notebooks")
+    continued = [f"notebooks/{each.name}" for each in earlier(path)]
+    return digest(*continued) if continued else ""
 
 
 def fill(code: str) -> Path:
@@ -63,12 +77,21 @@ def fill(code: str) -> Path:
     cache.mkdir(parents=True, exist_ok=True)
     timeout = yaml.safe_load((ROOT / "_config.yml").read_text())["execute"]["timeout"]  # of a cell, seconds
     project, start = get_cache(cache), time.perf_counter()
+    paths = sorted((ROOT / "notebooks").glob("*.ipynb"))
+    read, noted = {path.name: read_of_others(path) for path in paths}, cache / "read_of_others.json"
+    before = json.loads(noted.read_text(encoding="utf8")) if noted.exists() else {}
     keys = {}
-    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+    for path in paths:
         try:
-            project.match_cache_file(str(path))
+            known = project.match_cache_file(str(path))
+            if before.get(path.name, "") == read[path.name]:
+                continue
+            project.remove_cache(known.pk)
+            page = BUILD / ".doctrees" / "notebooks" / path.with_suffix(".doctree").name
+            page.unlink(missing_ok=True)  # Sphinx draws a page again whose doctree is gone
         except KeyError:
-            keys[path.name] = project.add_nb_to_project(str(path)).pk
+            pass
+        keys[path.name] = project.add_nb_to_project(str(path)).pk
     if not keys:
         return cache
     at_once = min(AT_ONCE, len(keys))
@@ -80,6 +103,7 @@ def fill(code: str) -> Path:
                 f"{count:3d} of {len(keys)}  {running[done]}  ({time.perf_counter() - start:.0f} s)",
                 flush=True,
             )
+    noted.write_text(json.dumps(read), encoding="utf8")
     return cache
 
 
