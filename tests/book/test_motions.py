@@ -8,6 +8,7 @@ import pytest
 
 from inbounds.book import motions
 from inbounds.book.report.over_seeds import final_policies
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import StudyFolder, store
 from inbounds.study.grid import AFTERWARDS
 from inbounds.study.outcomes import Outcomes
@@ -38,7 +39,14 @@ def test_a_changed_file_is_not_read(tmp_path: Path) -> None:
     assert motions.read(folder).keys() == motions.read(SHIPPED).keys()
     data[-1] ^= 1
     motions.motions_file(folder).write_bytes(data)
-    with pytest.raises(ValueError, match="is not what checksums"):
+    with pytest.raises(
+        DamagedFileError, match=r"is not what checksums\.txt lists\): restore it .*inbounds\.book\.motions"
+    ):
+        motions.read(folder)
+    motions.motions_file(folder).unlink()
+    with pytest.raises(
+        FileNotFoundError, match=r"there is no .*: play the robots \(python -m inbounds\.book\.motions"
+    ):
         motions.read(folder)
 
 

@@ -175,6 +175,8 @@ def test_unknown_names_are_refused() -> None:
         Cell("test", "ppo", "beta", "Hopper-v5")
     with pytest.raises(ValueError, match="no cell matches ant, x-\\*: use an arm \\(standard, printed"):
         select(["standard", "ant", "x-*"])
+    with pytest.raises(ValueError, match="no cell matches x: there are no cells to choose from"):
+        select(["x"], ())
 
 
 def test_selection_keeps_the_order() -> None:

@@ -12,7 +12,7 @@ import pytest
 from inbounds.study import StudyFolder, all_cells
 from inbounds.study.cell import SECOND_VERSION, STUDY_VERSION
 from inbounds.study.running.check_ways import check_replay, wrong_evaluation
-from inbounds.study.running.play_records import RECORDS, read_records
+from inbounds.study.running.play_records import RECORDS, read_records, records_file
 from inbounds.study.running.verify import (
     NOTHING_TO_RERUN,
     check_cells,
@@ -20,7 +20,7 @@ from inbounds.study.running.verify import (
     check_sums,
     columns,
 )
-from inbounds.study.store import COLUMNS, read_cell, read_metadata
+from inbounds.study.store import COLUMNS, read_cell, read_metadata, sha256
 from inbounds.study.ways_played import EPISODES, evaluated, evaluation_file, read_nothing, read_ways
 
 ROOT = Path(__file__).parents[2]
@@ -96,9 +96,11 @@ def test_every_shipped_policy_has_been_played_or_is_new() -> None:
     }
     mine = {cell.id for cell in CELLS if cell.family == "logit-normal" and cell.keeps_policies}
     mine &= {path.stem for path in (RESULTS.results / "policies").glob("*.safetensors")}
-    records = read_records(RESULTS)
+    records, policies = read_records(RESULTS), RESULTS.results / "policies"
     assert len(records) >= 20
     assert records.keys() <= mine
+    played = read_metadata(records_file(RESULTS), "policies")["policies"]
+    assert played == {name: sha256(policies / f"{name}.safetensors") for name in records}
     assert all(kinds.keys() == RECORDS.keys() for kinds in records.values())
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from inbounds import robots
 from inbounds.book.report.over_seeds import final_policies
 from inbounds.learning import TrainedPolicy, Trainer, preset
+from inbounds.learning.storage.whole_files import damaged
 from inbounds.study import store
 from inbounds.study.grid import AFTERWARDS, COMPARED
 from inbounds.study.ledger.untrained_returns import LOUD
@@ -249,15 +250,18 @@ def read(folder: StudyFolder) -> dict[str, Floats]:
     """Read what is kept, by cell and quantity.
 
     Raises:
-        ValueError: the file is not the one whose checksum is listed.
+        FileNotFoundError: there is no such file.
+        DamagedFileError: it is not the one whose checksum is listed.
 
     Example:
         >>> read(StudyFolder())["standard-swimmer-ppo-beta/fold"].shape  # in the project's folder
         (10,)
     """
     path = motions_file(folder)
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no {path}: {store.make(path)}")
     if store.sha256(path) != folder.checksums().get(path.name):
-        raise ValueError(f"{path.name} is not what {store.CHECKSUMS_FILE} lists")
+        raise damaged(path, f"it is not what {store.CHECKSUMS_FILE} lists", store.restore(path))
     return dict(safetensors.numpy.load_file(path))
 
 

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import functools
+import json
 from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).with_suffix("")
+
+
+def script_json(value: Any) -> str:
+    r"""Return a value as JSON that may stand in a script: nothing in it ends the script's element.
+
+    Example:
+        >>> script_json({"a": "</script>", "µ": [1, 2]})
+        '{"a":"<\\/script>","µ":[1,2]}'
+    """
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
 
 
 @functools.cache

@@ -212,6 +212,8 @@ def select(patterns: Sequence[str] = (), cells: Sequence[Cell] | None = None) ->
         cells = all_cells() if patterns else study_cells()
     matches = {p: [c for c in cells if c.arm == p or fnmatch.fnmatchcase(c.id, p)] for p in patterns}
     if missed := [pattern for pattern, found in matches.items() if not found]:
+        if not cells:
+            raise ValueError(f"no cell matches {', '.join(missed)}: there are no cells to choose from")
         raise ValueError(
             f"no cell matches {', '.join(missed)}: use an arm ({', '.join(dict.fromkeys(c.arm for c in cells))}), "
             f"a cell's id like {cells[0].id}, or a pattern like '*-hopper-ppo-*'"

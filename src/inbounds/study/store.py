@@ -20,7 +20,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from inbounds.learning import TrainConfig, TrainedPolicy, load_policies
 from inbounds.learning.storage.parquet import read_about, read_table
@@ -35,6 +34,15 @@ CHECKSUMS_FILE = "checksums.txt"
 OF_MANY_CELLS = ("nothing", "records")
 """Files of `evaluations` that are of no one cell."""
 MOTIONS = "motions.safetensors"
+UNTRAINED = "untrained.json"
+GREENHOUSE = "greenhouse"  # a folder
+MAKERS: Mapping[str, str] = {
+    MOTIONS: "play the robots (python -m inbounds.book.motions)",
+    UNTRAINED: "play the untrained policies (python -c "
+    "'from inbounds.study.ledger.untrained_returns import main; main()')",
+    GREENHOUSE: "train the greenhouses (python -m inbounds.book.own_task.greenhouse_runs)",
+}
+"""How files and folders are made that are of no cell."""
 State = Literal["missing", "finished", "damaged", "another configuration"]
 
 EVERY_EPOCH: Mapping[str, tuple[pa.DataType, str]] = {
@@ -318,33 +326,13 @@ def make(path: str | Path) -> str:
     Example:
         >>> make("results/motions.safetensors")
         'play the robots (python -m inbounds.book.motions)'
+        >>> make("results/greenhouse/beta.safetensors")
+        'train the greenhouses (python -m inbounds.book.own_task.greenhouse_runs)'
     """
     path = Path(path)
-    if path.name == MOTIONS:
-        return "play the robots (python -m inbounds.book.motions)"
+    if maker := MAKERS.get(path.name) or MAKERS.get(path.parent.name):
+        return maker
     if path.parent.name != "evaluations":
         return f"run the cell (inbounds study run {path.stem})"
     one = "" if path.stem in OF_MANY_CELLS else f" {path.stem}"
     return f"play the policies (inbounds study evaluate{one})"
-
-
-# ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch
-
-
-def pack(records: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Return records with the same names as one array `[E, ...]` per name.
-
-    Example:
-        >>> pack([{"epoch": 0, "kl": np.zeros(2)}, {"epoch": 1, "kl": np.ones(2)}])["kl"].shape
-        (2, 2)
-    """
-    return {name: np.stack([record[name] for record in records]) for name in (records[0] if records else ())}
-
-
-def unpack(packed: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """Return the records that `pack` was given; numbers as Python numbers."""
-    number = len(next(iter(packed.values()))) if packed else 0
-    return [
-        {name: array[i].item() if array.ndim == 1 else array[i].copy() for name, array in packed.items()}
-        for i in range(number)
-    ]

@@ -35,6 +35,7 @@ EPISODES: Mapping[str, int] = {robot: 3 if robot in ("Ant", "Humanoid") else 10 
 """Episodes of each seed: the final evaluation's ten starts, of the robots that pay for contacts, which take longest
 to simulate, the first three. Fixed before anything was played."""
 FIRST_STEPS = 16
+"""Env steps whose rewards are kept, to compare with on other machines."""
 
 COLUMNS: Mapping[str, tuple[pa.DataType, str]] = {
     "seed": (pa.int32(), "the seed that was trained"),
@@ -169,9 +170,20 @@ def other_policies(folder: StudyFolder, cell: Cell) -> str:
     """
     path, policies = evaluation_file(folder, cell), folder.policy_files(cell)[0]
     metadata = store.read_metadata(path, "policies", "session")
+    return of_others(path, policies, metadata["policies"] if store.is_of(cell, metadata) else "")
+
+
+def of_others(path: Path, policies: Path, played: str) -> str:
+    """Return why a file is not of the policies that are there; empty where it is.
+
+    Args:
+        path: of what was made of policies.
+        policies: where they are.
+        played: SHA-256 of those it was made of.
+    """
     if not policies.is_file():
         return f"{policies} is missing: {store.restore(policies)}"
-    if not store.is_of(cell, metadata) or metadata["policies"] != store.sha256(policies):
+    if played != store.sha256(policies):
         return f"{path} is of other policies than {policies}: {store.make(path)}"
     return ""
 

@@ -147,9 +147,11 @@ def test_it_says_what_the_chapter_says_of_three_seeds(outcomes: Outcomes) -> Non
     means = [np.array([np.mean(c) for c in itertools.combinations(side, 3)]) for side in sides]
     expected = float((means[0][:, None] > means[1]).mean())
     assert reports(*sides).shares()["means"]["higher"] == expected
-    assert (
-        f"{expected:.0%}".removesuffix("%") in re.search(r'alt="([^"]+)"', picked_seeds(outcomes).static)[1]
-    )  # type: ignore[index]
+    said = re.search(r'alt="([^"]+)"><figcaption>(.+)</figcaption>', picked_seeds(outcomes).static)
+    assert said is not None
+    alt, caption = said.groups()
+    assert f"{expected:.0%}".removesuffix("%") in caption
+    assert len(alt) < len(caption) / 3  # what stands beside the picture is not read twice
 
 
 def test_the_element_is_small_and_carries_its_scripts_only_in_a_notebook(

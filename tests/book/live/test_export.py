@@ -106,6 +106,13 @@ def test_what_was_not_trained_is_refused(robot: str, left: str) -> None:
         live_robot(VideoRow([]), robot, left)
 
 
+@pytest.mark.parametrize("seed", [-1, 10, 42])
+def test_a_seed_that_was_not_trained_is_refused(seed: int) -> None:
+    assert live_robot(VideoRow([]), seed=9).seed == 9
+    with pytest.raises(ValueError, match=f"with seed {seed}: choose one of 0 to 9"):
+        live_robot(VideoRow([]), seed=seed)
+
+
 def test_a_way_to_act_must_be_the_family_s() -> None:
     element = live_robot(VideoRow([]), "Ant", "ppo-beta", "ppo-beta", ways=("median", "mode"))
     assert 'data-ways="median mode"' in element._repr_html_()

@@ -5,6 +5,7 @@ import pytest
 
 from inbounds.book.own_task import best_of, compare, constant, play
 from inbounds.book.own_task.greenhouse import GreenhouseBatch
+from inbounds.study.statistics import mean_of
 from tests.learning.point import PointEnv
 
 
@@ -62,6 +63,15 @@ def test_leads_are_paired_by_day_and_resampled_by_what_is_random() -> None:
     assert policies.n == 10
     assert better.n == 200
     assert noise.low < 0 < noise.high
+
+
+def test_an_interval_does_not_depend_on_who_else_is_there() -> None:
+    days = np.random.default_rng(0).normal(50, 20, 200)
+    policies = days + np.random.default_rng(1).normal(3, 1, (10, 1))
+    mean, lead = compare({"rule": days, "policies": policies}, "rule")["policies"]
+    others = {"better": days + 1, "rule": days, "policies": policies}
+    assert compare(others, "rule")["policies"] == (mean, lead)
+    assert mean == mean_of(policies.mean(1))
 
 
 def test_what_cannot_be_compared_is_refused() -> None:

@@ -11,6 +11,8 @@ from inbounds.book.own_task import constant, greedy, greenhouse_runs, play
 from inbounds.book.own_task import greenhouse as house
 from inbounds.learning import Trainer
 from inbounds.learning.seeding import SeedStreams
+from inbounds.study import StudyFolder
+from inbounds.study.running.verify import check_sums
 
 
 @pytest.mark.parametrize(("power", "vent"), [(5.0, 0.0), (-2.0, 0.3), (0.0, 1.0)])
@@ -118,13 +120,17 @@ def test_no_day_serves_twice() -> None:
 
 
 def test_the_command_writes_what_the_readers_read(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    greenhouse_runs.run(tmp_path, seeds=2, epochs=1, days=(6000, 6001, 6002))
-    returns, curves = greenhouse_runs.read_returns(tmp_path), greenhouse_runs.read_curves(tmp_path)
+    folder = tmp_path / "greenhouse"
+    greenhouse_runs.run(folder, seeds=2, epochs=1, days=(6000, 6001, 6002))
+    assert [finding.message for finding in check_sums(StudyFolder(tmp_path))] == [
+        "6 of 6 files have their checksums"
+    ]
+    returns, curves = greenhouse_runs.read_returns(folder), greenhouse_runs.read_curves(folder)
     assert {found.shape for found in returns.values()} == {(2, 3)}
     for family in greenhouse_runs.FAMILIES:
         assert curves[family]["return_mean"].shape == (2, 1)
         assert np.isnan(curves[family]["sigma"]).all() == (family == "beta")
-        policy = greenhouse_runs.policies(family, tmp_path)[1]
+        policy = greenhouse_runs.policies(family, folder)[1]
         again = play(greedy(policy), house.GreenhouseBatch, (6000, 6001, 6002))
         np.testing.assert_allclose(again, returns[family, "greedy"][1], rtol=1e-5)
     assert "beta: done" in capsys.readouterr().out

@@ -13,22 +13,25 @@ from inbounds.cli import main
 from inbounds.learning.storage.parquet import parquet_bytes, read_table
 from inbounds.learning.storage.whole_files import DamagedFileError, held
 from inbounds.study.dial import running
-from inbounds.study.dial.cells import PILOT_SEEDS, POLICIES, SEEDS, DialCell, dial_cells
+from inbounds.study.dial.cells import FRACTIONS, POLICIES, SEEDS, DialCell, dial_cells
 from inbounds.study.dial.outcomes import (
+    COMPARISONS,
+    ENDPOINTS,
     MARGIN,
     DialOutcomes,
     constant_guess,
     kind_of,
-    prediction_table,
+    predicted_kind,
     score_of,
     settings,
     tally,
 )
 from inbounds.study.dial.running import DialFolder, run_cell, run_cells, wrong_cells
-from inbounds.study.dial.theory import Rates, predicted_curve
+from inbounds.study.dial.theory import MODELS, Rates, predicted_curve
 
 ROOT = Path(__file__).parents[3]
 PLAN = (ROOT / "results" / "DIAL.md").read_text(encoding="utf8")
+PILOT_SEEDS = range(900, 905)
 SMALL = tuple(DialCell(policy, 0.5, seeds=(900, 901), epochs=2) for policy in POLICIES)
 
 
@@ -164,6 +167,28 @@ def test_the_plan_is_the_code() -> None:
     assert "margin** is 0.05" in PLAN
     assert not set(PILOT_SEEDS) & set(SEEDS)
     assert f"Seeds {PILOT_SEEDS[0]} … {PILOT_SEEDS[-1]}" in PLAN
+
+
+def prediction_table() -> str:
+    """Return the predictions as a Markdown table: a row per comparison, endpoint, cost and A, a column per fraction.
+
+    Each entry has the class under *steps*, then under *geometry alone*: + above, − below, 0 no difference.
+    """
+    signs = {"above": "+", "below": "−", "no difference": "0"}
+    lines = ["| comparison | endpoint | cost | A | " + " | ".join(f"{f:g}" for f in FRACTIONS) + " |"]
+    lines.append("|---|---|---|---|" + "---|" * len(FRACTIONS))
+    knobs = list(dict.fromkeys((cell.cost, cell.dims) for cell in settings()))
+    for comparison in COMPARISONS:
+        for endpoint in ENDPOINTS:
+            for cost, dims in knobs:
+                row = [f"{comparison[0]} − {comparison[1]}", endpoint, cost, str(dims)]
+                for fraction in FRACTIONS:
+                    cell = DialCell("gaussian", fraction, cost, dims)
+                    row.append(
+                        "".join(signs[predicted_kind(cell, comparison, endpoint, m)] for m in MODELS[::-1])
+                    )
+                lines.append("| " + " | ".join(row) + " |")
+    return "\n".join(lines)
 
 
 @pytest.mark.slow

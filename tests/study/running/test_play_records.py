@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import run_cell
 from inbounds.study.running import play_records
 from inbounds.study.running.play_records import RECORDS, publish_records, read_records, records_of
@@ -53,11 +54,18 @@ def test_the_files_rows_are_the_policies(tmp_path: Path) -> None:
     rows = [row for row in records_of(cell, folder) if row["record"] == "action, bfloat16"]
     again = folder.policy_files(cell)[0]
     again.write_bytes(folder.policy_files(other)[0].read_bytes())
+    with pytest.raises(
+        DamagedFileError, match=f"is of other policies than {again}: .*inbounds study evaluate"
+    ):
+        read_records(folder)
     assert publish_records([cell, other], folder)  # whose policies have been replaced
     assert not publish_records([cell, other], folder)
     assert read_records(folder).keys() == {cell.id, other.id}
     assert [row["wrong"] for row in rows] == kinds["action, bfloat16"]["wrong"].tolist()
     assert [row["steps"] for row in rows] == [40, 40]
+    again.unlink()
+    with pytest.raises(DamagedFileError, match=f"{again} is missing: restore it"):
+        read_records(folder)
 
 
 def test_a_ratio_that_is_no_number_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

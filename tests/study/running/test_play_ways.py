@@ -19,12 +19,12 @@ from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import Cell, StudyFolder, read_cell, run_cell, store
 from inbounds.study.running import check_ways as checks
 from inbounds.study.running import evaluate, play_ways
-from inbounds.study.running.measure import FIRST_STEPS
 from inbounds.study.running.play_records import records_of
 from inbounds.study.running.play_ways import evaluate_cells, final_starts, play_cell
 from inbounds.study.running.verify import check_sums
 from inbounds.study.ways_played import (
     COLUMNS,
+    FIRST_STEPS,
     Played,
     evaluation_file,
     nothing_file,

@@ -121,6 +121,28 @@ def test_a_changed_byte_a_missing_and_a_foreign_file_are_found(folder: StudyFold
     ]
 
 
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("untrained.json", "inbounds.study.ledger.untrained_returns"),
+        ("greenhouse/curves.parquet", "python -m inbounds.book.own_task.greenhouse_runs"),
+        ("motions.safetensors", "python -m inbounds.book.motions"),
+    ],
+)
+def test_files_of_no_cell_are_checked_too(folder: StudyFolder, name: str, made: str) -> None:
+    path = folder.results / name
+    folder.publish({path: b"numbers"})
+    assert bad(verify([CELL], folder, rerun=())) == []
+    path.write_bytes(b"others")
+    (found,) = bad(verify([CELL], folder, rerun=()))
+    assert found.startswith(f"{name}: its checksum is wrong: restore it")
+    assert made in found
+    sums = folder.results / "checksums.txt"
+    sums.write_text("".join(line for line in sums.read_text().splitlines(True) if name not in line))
+    (found,) = bad(verify([CELL], folder, rerun=()))
+    assert found == f"{name}: not in checksums.txt: delete it, or restore the list"
+
+
 def test_rows_cut_off_or_of_another_configuration_are_found(folder: StudyFolder) -> None:
     republish(folder, read_cell(folder.cell_file(CELL)).slice(0, 18))
     assert "18 rows instead of 20" in bad(verify([CELL], folder, rerun=()))[0]

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import functools
 import html
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +43,7 @@ from inbounds.book.building import builds_the_book
 from inbounds.book.drawing import figures
 from inbounds.book.drawing.variables import color_variables
 from inbounds.book.explorables.legend import Mark
+from inbounds.book.templates import script_json
 
 _HERE = Path(__file__).parent
 
@@ -159,8 +159,7 @@ class Explorable:
             *self.controls, sizing_mode="stretch_width", styles={"flex-wrap": "wrap", "gap": "0 1rem"}
         )
         layout = column(controls, *self.plots, sizing_mode="stretch_width")
-        item = _with_fixed_ids(json_item(layout), self.name)
-        return json.dumps(item, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
+        return script_json(_with_fixed_ids(json_item(layout), self.name))
 
     def html(self, *, live: bool) -> str:
         """Return the explorable as HTML.
@@ -248,14 +247,13 @@ def _style_sheet(looks: tuple[tuple[str, figures.FamilyStyle], ...]) -> str:
 def _scripts() -> str:
     """Return all scripts in one element that runs each at most once per page."""
     texts = [path.read_text(encoding="utf-8") for path in javascript_files()]
-    sources = json.dumps(texts, ensure_ascii=False).replace("</", "<\\/")
     load = (
         "((sources) => {"
         f"if (!globalThis.inbounds?.boot || !globalThis.Bokeh?.['{bokeh.__version__}'])"
         " for (const text of sources)"
         " document.head.appendChild(Object.assign(document.createElement('script'), {textContent: text}));"
         " else inbounds.boot();"
-        f"}})({sources})"
+        f"}})({script_json(texts)})"
     )
     return f"<script>{load}</script>"
 

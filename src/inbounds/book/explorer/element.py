@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +20,7 @@ from inbounds.book.report.arms import Part
 from inbounds.book.report.html import NONE_FINISHED
 from inbounds.book.report.study_figures import Curve, learning_curves
 from inbounds.book.report.words import in_words
-from inbounds.book.templates import macros
+from inbounds.book.templates import macros, script_json
 from inbounds.study.analysis import curve, estimate
 from inbounds.study.grid import COMPARED, ROBOTS
 from inbounds.study.outcomes import Outcome, Outcomes
@@ -57,11 +56,10 @@ class StudyExplorer:
 
     def _repr_html_(self) -> str:
         looks = {family: {"dash": DASHES[look.linestyle]} for family, look in LOOKS.items()}
-        text = json.dumps(self.data | {"looks": looks}, ensure_ascii=False, separators=(",", ":"))
         return str(
             macros("explorer").explorer(
                 self.data,
-                text.replace("</", "<\\/"),
+                script_json(self.data | {"looks": looks}),
                 self.first,
                 self.static,
                 style_sheet(ELEMENT),

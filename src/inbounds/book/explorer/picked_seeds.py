@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import itertools
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +29,7 @@ from inbounds.book.report.as_they_come import Compared
 from inbounds.book.report.html import NONE_FINISHED
 from inbounds.book.report.study_figures import SHORT
 from inbounds.book.report.words import ALGORITHMS
-from inbounds.book.templates import macros
+from inbounds.book.templates import macros, script_json
 from inbounds.study.analysis import scores
 from inbounds.study.grid import ROBOTS
 from inbounds.study.outcomes import Outcomes
@@ -133,10 +132,9 @@ class PickedSeeds:
     def _repr_html_(self) -> str:
         if not self.data["rows"]:
             return self.static
-        text = json.dumps(self.data, ensure_ascii=False, separators=(",", ":"))
         return str(
             macros("picked_seeds").element(
-                text.replace("</", "<\\/"), self.static, style_sheet(ELEMENT), carried_scripts(ELEMENT)
+                script_json(self.data), self.static, style_sheet(ELEMENT), carried_scripts(ELEMENT)
             )
         )
 
@@ -199,11 +197,12 @@ def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
         f"{rule} it is higher in {percent(shares[key]['higher'])}, lower in {percent(shares[key]['lower'])}"
         for key, rule in (("means", "by the two means"), ("interval", "by Welch's 95 % interval"))
     )
-    alt = (
-        f"Histogram of the differences that all {every.value.size} ways to take three seeds of each family report, "
+    caption = (
+        f"The differences that all {every.value.size} ways to take three seeds of each family report, "
         f"{names[0].lower()} minus {names[1]} on {row.robot} under {row.contrast.algorithm.upper()}: {told}."
     )
-    return str(macros("picked_seeds").static(picture, alt))
+    alt = "Histogram of the differences, with a line at that of all ten seeds."
+    return str(macros("picked_seeds").static(picture, alt, caption))
 
 
 __all__ = ["FIRST", "TICKED", "PickedSeeds", "Reports", "pairs", "picked_seeds", "reports"]

@@ -11,7 +11,7 @@ from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.drawing.variables import color_variables
 from inbounds.book.live.export import NAMES
 from inbounds.book.templates import macros
-from inbounds.study.grid import ROBOTS, THESIS
+from inbounds.study.grid import ARMS, ROBOTS, THESIS
 from inbounds.study.ways_played import ways_of
 
 _HERE = Path(__file__).parent
@@ -19,6 +19,7 @@ _COLORS = {
     "light": {"ink": "#22272d", "line": "#5f6770", "box": "#e4e9ef", "clip": "#d1006c", "sky": "#e9eef4"},
     "dark": {"ink": "#ced6dd", "line": "#9ca4af", "box": "#2c3644", "clip": "#ff6fae", "sky": "#1b222c"},
 }
+_SEEDS = ARMS["standard"][0].kept_seeds
 POLICIES = tuple(f"{algorithm}-{family}" for algorithm, family in THESIS)
 """What may move a robot: columns of arm 1, by algorithm and family."""
 
@@ -87,7 +88,7 @@ def live_robot(
             median-snapped or sample-snapped, as the family has it.
 
     Raises:
-        ValueError: there is no such robot, no such policy, or no such way to act.
+        ValueError: there is no such robot, no such policy, no such seed, or no such way to act.
 
     Example:
         >>> from inbounds.book.drawing.videos import VideoRow
@@ -99,6 +100,8 @@ def live_robot(
     for policy in (left, right or left):
         if policy not in POLICIES:
             raise ValueError(f"no policy {policy!r} was trained; there are {', '.join(POLICIES)}")
+    if seed not in _SEEDS:
+        raise ValueError(f"nobody was trained with seed {seed!r}: choose one of {_SEEDS[0]} to {_SEEDS[-1]}")
     for policy, way in zip((left, right or left), ways, strict=True):
         family = policy.partition("-")[2]
         if way not in ways_of(family):

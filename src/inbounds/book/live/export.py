@@ -18,6 +18,7 @@ import numpy as np
 import safetensors.numpy
 from numpy.typing import NDArray
 
+from inbounds.book.templates import script_json
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.seeding import SeedStreams
@@ -43,10 +44,9 @@ def script(place: str, key: str, value: Any) -> str:
 
     Example:
         >>> script("robots", "Hopper", {"motors": 3})
-        'inbounds.live.robots["Hopper"] = {"motors": 3};\n'
+        'inbounds.live.robots["Hopper"] = {"motors":3};\n'
     """
-    text = json.dumps(value, ensure_ascii=False).replace("</", "<\\/")
-    return f"inbounds.live.{place}[{json.dumps(key)}] = {text};\n"
+    return f"inbounds.live.{place}[{json.dumps(key)}] = {script_json(value)};\n"
 
 
 def packed(*arrays: NDArray[Any]) -> str:

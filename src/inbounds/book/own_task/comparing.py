@@ -24,8 +24,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from inbounds.learning import TrainedPolicy
-from inbounds.study.statistics import Estimate, bootstrap
-from inbounds.study.statistics.settings import MANY_RESAMPLES
+from inbounds.study.statistics import Estimate, mean_of
 
 __all__ = ["best_of", "compare", "constant", "greedy", "noisy", "play"]
 
@@ -122,19 +121,17 @@ def best_of(
     return max(earned, key=earned.__getitem__), earned
 
 
-def compare(
-    returns: Mapping[str, Floats], rival: str, seed: int = 0
-) -> dict[str, tuple[Estimate, Estimate | None]]:
+def compare(returns: Mapping[str, Floats], rival: str) -> dict[str, tuple[Estimate, Estimate | None]]:
     """Return each one's mean return, and its lead over a rival that has no seeds, with 95 % intervals.
 
     Args:
         returns: by name: `[N]` of one actor on N days, or `[S, N]` of the policies of S seeds on the same days.
         rival: a name of theirs, with returns `[N]`.
-        seed: of the bootstrap.
 
     Returns:
         Mean and lead of each name. Policies are resampled by seed (another training run, the same days). One actor is
-        resampled by day, and its lead is paired day by day. The rival's own lead is None.
+        resampled by day, and its lead is paired day by day. The rival's own lead is None. An interval is the
+        same whoever else is there.
 
     Raises:
         ValueError: the rival has seeds, or the days are not the same for all.
@@ -149,11 +146,9 @@ def compare(
     theirs = returns[rival]
     if theirs.ndim != 1:
         raise ValueError(f"{rival} has seeds: a rival is one program, which earns one number a day")
-    rng = np.random.default_rng(seed)
 
     def over(values: Floats) -> Estimate:
-        each = values.mean(1) if values.ndim == 2 else values
-        return bootstrap(each, rng, statistic="mean", resamples=MANY_RESAMPLES)
+        return mean_of(values.mean(1) if values.ndim == 2 else values)
 
     found: dict[str, tuple[Estimate, Estimate | None]] = {}
     for name, values in returns.items():

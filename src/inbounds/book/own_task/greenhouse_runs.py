@@ -21,6 +21,7 @@ from inbounds.book.own_task.comparing import Actor, Floats, greedy, noisy, play
 from inbounds.book.own_task.greenhouse import GreenhouseBatch
 from inbounds.learning import FAMILIES, TrainConfig, TrainedPolicy, Trainer, load_policies, preset
 from inbounds.learning.storage.run_store import save_policies
+from inbounds.study.store import GREENHOUSE, ROOT, StudyFolder
 
 __all__ = ["CHOSEN_BY", "FAMILIES", "TESTED", "plan", "policies", "read_curves", "read_returns"]
 
@@ -31,7 +32,7 @@ TESTED = tuple(range(6000, 6200))
 WAYS = ("greedy", "noisy")
 RECORDED = ("return_mean", "saturation", "kl", "clip_fraction", "explained_variance", "episodes", "sigma")
 EPOCHS = 160
-FOLDER = Path(__file__).resolve().parents[4] / "results" / "greenhouse"
+FOLDER = ROOT / "results" / GREENHOUSE
 
 
 def plan(family: str, seeds: int | tuple[int, ...] = 10, epochs: int = EPOCHS) -> TrainConfig:
@@ -98,10 +99,10 @@ def read_curves(folder: Path = FOLDER) -> dict[str, dict[str, Floats]]:
 
 
 def run(folder: Path = FOLDER, seeds: int = 10, epochs: int = EPOCHS, days: tuple[int, ...] = TESTED) -> None:
-    """Train all families, play their policies, and write the three kinds of file.
+    """Train all families, play their policies, and write the three kinds of file and their checksums.
 
     Args:
-        folder: where to.
+        folder: where to; the list of checksums is beside it.
         seeds: how many of each family.
         epochs: of training.
         days: on which the policies are played.
@@ -125,6 +126,8 @@ def run(folder: Path = FOLDER, seeds: int = 10, epochs: int = EPOCHS, days: tupl
         print(f"{family}: done", flush=True)
     _write(folder / "curves.parquet", curves)
     _write(folder / "returns.parquet", returns)
+    files = sorted(folder.glob("[!.]*"))
+    StudyFolder(folder.parent).publish({path: path.read_bytes() for path in files})
 
 
 def _rows(table: pa.Table, **values: str) -> pa.Table:

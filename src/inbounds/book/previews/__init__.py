@@ -14,6 +14,8 @@ import shutil
 from collections import defaultdict
 from pathlib import Path
 
+from inbounds.book.templates import script_json
+
 HERE = Path(__file__).parent
 FOLDER = "previews"  # below _static
 _LINK = re.compile(r'<a class="reference internal" href="(?P<page>[^"#:]*)#(?P<id>[^"]+)"')
@@ -52,8 +54,7 @@ def write(folder: Path) -> int:
     for name, targets in wanted.items():
         if found := previews(pages.get(name, ""), targets):
             made += len(found)
-            content = json.dumps(found, ensure_ascii=False).replace("</", "<\\/")
-            script = f"inbounds.previews.come({json.dumps(name)}, {content});\n"
+            script = f"inbounds.previews.come({json.dumps(name)}, {script_json(found)});\n"
             (home / f"{name.replace('/', '.')}.js").write_text(script, encoding="utf8")
     for name, text in pages.items():
         static = posixpath.relpath(f"_static/{FOLDER}", posixpath.dirname(name) or ".")

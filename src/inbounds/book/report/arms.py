@@ -20,7 +20,7 @@ from inbounds.study.analysis import CONTRASTS, ENDPOINTS, Contrast
 from inbounds.study.grid import ARMS, ROBOTS
 from inbounds.study.outcomes import Column, Outcome, Outcomes
 from inbounds.study.statistics import Comparison, Estimate
-from inbounds.study.statistics.settings import LEVEL
+from inbounds.study.statistics.settings import LAST_EVALUATIONS, LEVEL
 from inbounds.study.words import p_value, percent, spoken, verdict
 
 
@@ -268,7 +268,7 @@ def _share_at_a_clamp(measured: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _first_and_last(values: np.ndarray) -> str:
-    first, last = values[:, 0], values[:, -5:].mean(1)
+    first, last = values[:, 0], values[:, -LAST_EVALUATIONS:].mean(1)
     return " → ".join(f"{np.nanmedian(x):.3g}" if np.isfinite(x).any() else "–" for x in (first, last))
 
 

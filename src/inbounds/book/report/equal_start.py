@@ -15,13 +15,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from inbounds.study import statistics
 from inbounds.study.analysis import difference_of
 from inbounds.study.grid import AFTERWARDS, FREE, ROBOTS, second_cells
 from inbounds.study.outcomes import Column, Outcome, Outcomes
-from inbounds.study.second import GAUSSIAN, MARGINS, primary
-from inbounds.study.second.pooled import is_whole, pooled
-from inbounds.study.second.primary import BOUNDED, finding, gap
+from inbounds.study.second import GAUSSIAN, MARGINS, Pair, compared, pooled_difference, primary
+from inbounds.study.second.pooled import pooled
+from inbounds.study.second.primary import BOUNDED, are_whole, finding
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
 from inbounds.study.statistics.settings import SIGNIFICANCE
@@ -211,8 +210,8 @@ def exploratory(outcomes: Outcomes, gaussian: Column, endpoint: str) -> list[Evi
     for law in LAWS:
         pair = Column("equal", "ppo", law), gaussian
         for robot in ROBOTS:
-            if (found := gap(outcomes, *pair, robot, endpoint).difference) is not None:
-                whole = all(is_whole(outcomes, column, robot) for column in pair)
+            if (found := pooled_difference(outcomes, *pair, robot, endpoint)) is not None:
+                whole = are_whole(outcomes, *pair, robot)
                 rows.append(Evidence(robot, "ppo", law, endpoint, found, study=2, whole=whole))
     return rows
 
@@ -299,14 +298,12 @@ def _under_trpo(outcomes: Outcomes) -> Iterable[Evidence]:
 
 def _tested(outcomes: Outcomes, first: Column, second: Column, endpoint: str) -> dict[str, Evidence]:
     """Return a secondary comparison of the second study by robot, corrected over its robots as the protocol has it."""
-    gaps = {robot: gap(outcomes, first, second, robot, endpoint) for robot in ROBOTS}
-    whole = {robot: all(is_whole(outcomes, column, robot) for column in (first, second)) for robot in ROBOTS}
-    adjusted = statistics.holm([each.p_value for each in gaps.values()])
+    place = first.algorithm, first.family, endpoint
     return {
         robot: Evidence(
-            robot, first.algorithm, first.family, endpoint, each.difference, 2, float(p), whole[robot]
+            robot, *place, each.difference, 2, each.p_adjusted, are_whole(outcomes, first, second, robot)
         )
-        for (robot, each), p in zip(gaps.items(), adjusted, strict=True)
+        for robot, each in compared(outcomes, Pair(first, second), endpoint).items()
         if each.difference is not None
     }
 

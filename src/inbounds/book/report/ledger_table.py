@@ -16,10 +16,10 @@ from inbounds.study.words import percent
 
 HEAD = ("claim", "verdict, test and result")
 _CAPTION = (
-    f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds; p of a "
-    "permutation test, corrected over the six robots (Holm). Open: the interval leaves both possible, or, not after "
-    "Holm, the test does not find what it shows. Moot: there is nothing to explain. Exploratory: the protocol does not "
-    "list such a number. Stays undecided: no missing cell can decide it."
+    f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds, of "
+    "fisher-time over ten repeats; p of a permutation test, corrected over the six robots (Holm). Open: the interval "
+    "leaves both possible, or, not after Holm, the test does not find what it shows. Moot: there is nothing to "
+    "explain. Exploratory: the protocol does not list such a number. Stays undecided: no missing cell can decide it."
 )
 
 

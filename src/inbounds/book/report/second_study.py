@@ -32,6 +32,7 @@ from inbounds.study.second import (
 from inbounds.study.second.primary import BOUNDED
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.statistics import Estimate
+from inbounds.study.statistics.settings import SIGNIFICANCE
 from inbounds.study.words import p_value, percent, spoken
 
 BLOCKS = {
@@ -87,9 +88,9 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
     ]
     caption = (
         "Primary comparison: bounded law minus Gaussian with a free σ, PPO, executed noise 0.4 at the start. "
-        "Refuted: the whole interval lies within the margin, with 0 in it or not. Confirmed or contradicted: p < 0.05 "
-        "after Holm over the 24, not refuted, and the difference above or below 0. Undecided: all else. A finding "
-        "waits until twenty seeds a side are there. "
+        "Refuted: the whole interval lies within the margin, with 0 in it or not. Confirmed or contradicted: "
+        f"p < {SIGNIFICANCE} after Holm over the 24, not refuted, and the difference above or below 0. "
+        "Undecided: all else. A finding waits until twenty seeds a side are there. "
         f"Of {len(rows)}: {', '.join(f'{count} {word}' for word, count in words.items())}."
     )
     return html.of_study(

@@ -12,8 +12,6 @@ from inbounds.study.dial.task import DialTask
 FRACTIONS = (0.25, 0.5, 0.9, 1.5, 3.0)
 DIMS = (1, 8)
 SEEDS = tuple(range(10))
-PILOT_SEEDS = tuple(range(900, 905))
-"""Used to choose ranges and rates, and never for the map."""
 EPOCHS = 40
 INITIAL_STD = 0.4  # executed, of half the range: the same start for every law
 HORIZON = 256

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, ndtr, polygamma
 
+from inbounds.learning import Limits
 from inbounds.learning.families.initial_noise import head_bias
 from inbounds.learning.families.policy import PolicyConfig
 from inbounds.study.dial.task import DialTask
 
-CAP = 80.0  # of a Beta's concentrations: `Limits.concentration_max`
+CAP = Limits().concentration_max  # of a Beta's
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(80)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 Pair = NDArray[np.float64]

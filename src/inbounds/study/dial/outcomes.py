@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from inbounds.study.dial.cells import FRACTIONS, DialCell, dial_cells
+from inbounds.study.dial.cells import DialCell, dial_cells
 from inbounds.study.dial.theory import MODELS, Model, predicted_curve
 from inbounds.study.statistics import Estimate, area_under_curve, carry_forward, difference, final_score
 
@@ -182,25 +182,3 @@ def constant_guess(findings: Sequence[Finding]) -> tuple[Kind, int]:
     """Return the class that is right most often if it is guessed everywhere, and how often."""
     counts = Counter(finding.kind for finding in findings if finding.kind != "unresolved")
     return counts.most_common(1)[0] if counts else ("unresolved", 0)
-
-
-def prediction_table() -> str:
-    """Return the predictions as a Markdown table: a row per comparison, endpoint, cost and A, a column per fraction.
-
-    Each entry has the class under *steps*, then under *geometry alone*: + above, − below, 0 no difference.
-    """
-    signs = {"above": "+", "below": "−", "no difference": "0"}
-    lines = ["| comparison | endpoint | cost | A | " + " | ".join(f"{f:g}" for f in FRACTIONS) + " |"]
-    lines.append("|---|---|---|---|" + "---|" * len(FRACTIONS))
-    knobs = list(dict.fromkeys((cell.cost, cell.dims) for cell in settings()))
-    for comparison in COMPARISONS:
-        for endpoint in ENDPOINTS:
-            for cost, dims in knobs:
-                row = [f"{comparison[0]} − {comparison[1]}", endpoint, cost, str(dims)]
-                for fraction in FRACTIONS:
-                    cell = DialCell("gaussian", fraction, cost, dims)
-                    row.append(
-                        "".join(signs[predicted_kind(cell, comparison, endpoint, m)] for m in MODELS[::-1])
-                    )
-                lines.append("| " + " | ".join(row) + " |")
-    return "\n".join(lines)

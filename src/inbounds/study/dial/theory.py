@@ -18,7 +18,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from inbounds.learning import PPOConfig
+from inbounds.learning import Limits, PPOConfig
 from inbounds.study.dial.cells import INITIAL_STD, POLICIES, DialCell
 from inbounds.study.dial.laws import Pair, expected_return, information, start
 from inbounds.study.dial.task import DialTask
@@ -27,7 +27,7 @@ Model: TypeAlias = Literal["geometry", "steps"]
 MODELS: tuple[Model, ...] = ("geometry", "steps")
 _PARTS = 10  # small steps an epoch is made of
 _SLOPE = 1e-5  # for central differences
-LIMITS = (-10.0, 1.0)  # of log σ: `Limits`
+LIMITS = (Limits().log_std_min, Limits().log_std_max)  # of log σ
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Evidence that needs no cell: claims of mathematics and of cost, computed where they are asked for.
 
-Exact numbers are errors of computing; those that depend on drawn seeds come with an interval over seeds.
+Exact numbers are errors of computing; those that depend on drawn seeds come with an interval over seeds, times with
+one over repeats.
 """
 
 from __future__ import annotations
@@ -159,7 +160,7 @@ def sampled_error(_: Outcomes) -> list[Statement]:
 
 
 def sampled_time(_: Outcomes) -> list[Statement]:
-    """State that the sampled product takes longer: its processor time over the closed form's. For: above 1."""
+    """State that the sampled product takes longer: its time over the closed form's, over repeats. For: above 1."""
     ratio = combination([_fisher_routes()[1]], [1])
     return [
         Statement("its processor time over that of the closed form", side(ratio, 1, 1.0), ratio, digits=2)

@@ -19,12 +19,13 @@ import numpy as np
 
 from inbounds.learning import Trainer, preset
 from inbounds.learning.updates.threads import one_thread
+from inbounds.study.cell import LOUD_NOISE
 from inbounds.study.outcomes import Floats
-from inbounds.study.store import ROOT
+from inbounds.study.store import ROOT, UNTRAINED, StudyFolder
 
-LOUD = 0.7
+LOUD = LOUD_NOISE
 """Executed standard deviation, in half ranges: near a Gaussian's default, and near the most a logit-normal can have."""
-FILE = ROOT / "results" / "untrained.json"
+FILE = ROOT / "results" / UNTRAINED
 Mode = Literal["clip", "raw"]
 Which = tuple[str, str, float | None, Mode]
 KEPT: tuple[Which, ...] = (
@@ -86,6 +87,6 @@ def _kept(file: Path) -> dict[str, list[float]]:
 
 
 def main() -> None:
-    """Play all of `KEPT` and write the file."""
+    """Play all of `KEPT` and write the file, its checksum first."""
     found = {_name(*which): [round(float(x), 4) for x in play(*which)] for which in KEPT}
-    FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf8")
+    StudyFolder(FILE.parent).publish({FILE: (json.dumps(found, indent=1) + "\n").encode()})

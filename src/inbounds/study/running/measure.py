@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,9 @@ from inbounds.learning import DivergedSeedWarning, Rollout, Trainer
 from inbounds.study import store
 from inbounds.study.grid import Cell
 from inbounds.study.running.evaluate import GreedyEvaluation
+from inbounds.study.ways_played import FIRST_STEPS
 
 MEASURE_EVERY = 10  # epochs; the first is measured too: its rollout is the untrained policy's
-FIRST_STEPS = 16  # whose rewards are kept, to compare with on other machines
 
 
 class Progress:
@@ -36,11 +36,11 @@ class Progress:
 
     def state_dict(self) -> dict[str, Any]:
         """Return it, packed."""
-        return {**vars(self), "measurements": store.pack(self.measurements)}
+        return {**vars(self), "measurements": pack(self.measurements)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Go back to what `state_dict` returned."""
-        vars(self).update({**state, "measurements": store.unpack(state["measurements"])})
+        vars(self).update({**state, "measurements": unpack(state["measurements"])})
 
 
 class MeasuredTrainer:
@@ -105,14 +105,36 @@ class MeasuredTrainer:
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the future, and the results, depend on."""
         state = self.trainer.state_dict()
-        return state | {"records": store.pack(self.trainer.records), "study": self.progress.state_dict()}
+        return state | {"records": pack(self.trainer.records), "study": self.progress.state_dict()}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Go back to a state from `state_dict` of a run with the same configuration."""
-        self.trainer.load_state_dict({**state, "records": store.unpack(state["records"])})
+        self.trainer.load_state_dict({**state, "records": unpack(state["records"])})
         self.progress.load_state_dict(state["study"])
 
     def close(self) -> None:
         """Close the environments."""
         self.evaluation.players.close()
         self.trainer.envs.close()
+
+
+# ---- packed records: a checkpoint with five hundred small dictionaries would take longer than an epoch
+
+
+def pack(records: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Return records with the same names as one array `[E, ...]` per name.
+
+    Example:
+        >>> pack([{"epoch": 0, "kl": np.zeros(2)}, {"epoch": 1, "kl": np.ones(2)}])["kl"].shape
+        (2, 2)
+    """
+    return {name: np.stack([record[name] for record in records]) for name in (records[0] if records else ())}
+
+
+def unpack(packed: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    """Return the records that `pack` was given; numbers as Python numbers."""
+    number = len(next(iter(packed.values()))) if packed else 0
+    return [
+        {name: array[i].item() if array.ndim == 1 else array[i].copy() for name, array in packed.items()}
+        for i in range(number)
+    ]

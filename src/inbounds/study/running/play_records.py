@@ -24,12 +24,14 @@ from torch import Tensor
 
 from inbounds.learning.families import NORMAL
 from inbounds.learning.storage.parquet import parquet_bytes
+from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import store
 from inbounds.study.grid import STUDY_VERSION, Cell
 from inbounds.study.running.evaluate import FINAL, Players, generator_of
 from inbounds.study.running.play_ways import final_starts, run_with_policies
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import StudyFolder
+from inbounds.study.ways_played import of_others
 
 Floats = NDArray[np.float64]
 OFF = 0.01
@@ -198,18 +200,27 @@ def records_file(folder: StudyFolder) -> Path:
 def read_records(folder: StudyFolder) -> dict[str, dict[str, dict[str, Floats]]]:
     """Read what records keep: by cell and kind of record, each column as `[S]`.
 
+    Raises:
+        FileNotFoundError: there are none.
+        DamagedFileError: the file is damaged, or of other policies than those that are there.
+
     Example:
         >>> records = read_records(StudyFolder())  # in the project's folder
         >>> records["standard-ant-ppo-logit-normal"]["latent, float32"]["wrong"].max().item()
         0.0
     """
-    table = store.read_cell(records_file(folder))
+    path = records_file(folder)
+    table, played = store.read_cell(path), store.read_metadata(path, "policies")["policies"]
     names = [name for name in SCHEMA.names if name not in ("cell", "seed", "record")]
     found: dict[str, dict[str, dict[str, list[float]]]] = {}
     for row in table.to_pylist():
         kinds = found.setdefault(row["cell"], {}).setdefault(row["record"], {name: [] for name in names})
         for name in names:
             kinds[name].append(row[name])
+    for cell in found:
+        policies = folder.results / "policies" / f"{cell}.safetensors"
+        if said := of_others(path, policies, played.get(cell, "")):
+            raise DamagedFileError(said)
     return {
         cell: {record: {n: np.array(v) for n, v in columns.items()} for record, columns in kinds.items()}
         for cell, kinds in found.items()

@@ -243,9 +243,7 @@ def _compare_first_rewards(name: str, found: NDArray[Any], metadata: dict[str, A
 
 
 def _data_files(results: Path) -> list[Path]:
-    return [
-        path
-        for part in ("cells", "policies", "evaluations")
-        for path in (results / part).glob("[!.]*")
-        if path.is_file()
-    ]
+    folders = ("cells", "policies", "evaluations", store.GREENHOUSE)
+    single = [results / name for name in (store.MOTIONS, store.UNTRAINED)]
+    paths = [path for part in folders for path in (results / part).glob("[!.]*")]
+    return [path for path in (*paths, *single) if path.is_file()]

@@ -41,6 +41,8 @@ class Gap:
     """Of the means."""
     p_value: float
     """Of equal means, by `permutation_test`."""
+    whole: bool
+    """Whether all planned seeds of both sides are there."""
 
 
 @dataclass(frozen=True)
@@ -115,16 +117,21 @@ def gap(
     one whose cells are missing.
     """
     place = (outcomes, first, second, robot, endpoint)
+    whole = are_whole(outcomes, first, second, robot)
     if (found := _both(*place, without_diverged=without_diverged)) is None:
-        return Gap(None, float("nan"))
+        return Gap(None, float("nan"), whole)
     estimate, sides, rng = found
-    whole = all(is_whole(outcomes, column, robot) for column in (first, second))
     p_value = (
         statistics.permutation_test(*sides, rng, permutations=PERMUTATIONS, missing="exclude")
         if whole
         else float("nan")
     )
-    return Gap(estimate, p_value)
+    return Gap(estimate, p_value, whole)
+
+
+def are_whole(outcomes: Outcomes, first: Column, second: Column, robot: str) -> bool:
+    """Return whether all planned seeds of two columns on a robot are there."""
+    return all(is_whole(outcomes, column, robot) for column in (first, second))
 
 
 def pooled_difference(
@@ -178,14 +185,10 @@ def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[Prima
         gap(outcomes, _column(law), GAUSSIAN, robot, endpoint, without_diverged=without_diverged)
         for law, endpoint, robot in places
     ]
-    whole = [
-        all(is_whole(outcomes, column, robot) for column in (_column(law), GAUSSIAN))
-        for law, _, robot in places
-    ]
     adjusted = statistics.holm([each.p_value for each in gaps])
     return [
-        PrimaryRow(*place, each.difference, each.p_value, float(p), MARGINS[place[1]][place[2]], done)
-        for place, each, p, done in zip(places, gaps, adjusted, whole, strict=True)
+        PrimaryRow(*place, each.difference, each.p_value, float(p), MARGINS[place[1]][place[2]], each.whole)
+        for place, each, p in zip(places, gaps, adjusted, strict=True)
     ]
 
 

@@ -20,6 +20,7 @@ from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.primary import gap
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Comparison, Equivalence
+from inbounds.study.statistics.settings import SIGNIFICANCE
 
 _GAUSSIAN, _FREE = ("gaussian", ""), ("gaussian", FREE)
 _BETA, _LOGIT, _LOGIT_FREE = ("beta", ""), ("logit-normal", ""), ("logit-normal", FREE)
@@ -181,7 +182,7 @@ TWINS = tuple(
 """Cells of both studies that differ by engine and seeds alone."""
 
 
-def engines_agree(outcomes: Outcomes, level: float = 0.05) -> dict[tuple[str, str, str], Equivalence]:
+def engines_agree(outcomes: Outcomes, level: float = SIGNIFICANCE) -> dict[tuple[str, str, str], Equivalence]:
     """Test whether the compiled engine's returns are those of autograd, by cells that both studies have.
 
     Two one-sided tests (`inbounds.study.statistics.equivalence`) within `MARGINS`, ten seeds a side.

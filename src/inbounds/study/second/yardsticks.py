@@ -26,8 +26,6 @@ def _by_robot(*values: float) -> Mapping[str, float]:
 
 DO_NOTHING = _by_robot(-0.24, 145.58, 0.47, 94.46, 994.07, 198.53)
 """Mean return of 100 episodes in which every action is 0, from the starts 0 to 99."""
-UNTRAINED = _by_robot(-178.70, 23.19, -0.73, 6.93, 119.44, 127.01)
-"""Mean return of the first epoch of the first study's quiet Gaussian under PPO, executed noise 0.4."""
 BEST = MappingProxyType(
     {
         "final": _by_robot(6077.34, 2127.81, 119.68, 3209.66, 1335.21, 1184.44),
@@ -41,7 +39,8 @@ MARGINS = MappingProxyType(
         "area": _by_robot(860, 340, 18, 390, 170, 115),
     }
 )
-"""A difference smaller than this does not matter: a fifth of what training adds, `BEST` − `UNTRAINED`, rounded."""
+"""A difference smaller than this does not matter: a fifth of what training adds, `BEST` minus the first epoch of the
+first study's quiet Gaussian under PPO, rounded."""
 
 
 def normalized(outcomes: Outcomes, column: Column, endpoint: str) -> dict[str, Floats] | None:

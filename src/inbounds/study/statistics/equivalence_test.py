@@ -10,6 +10,7 @@ from scipy import stats
 
 from inbounds.study.statistics.comparisons import ratio, two_groups, welch
 from inbounds.study.statistics.seeds import Missing
+from inbounds.study.statistics.settings import SIGNIFICANCE
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ def equivalence(
     second: ArrayLike,
     margin: float,
     *,
-    level: float = 0.05,
+    level: float = SIGNIFICANCE,
     paired: bool = False,
     missing: Missing = "raise",
 ) -> Equivalence:

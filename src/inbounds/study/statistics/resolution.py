@@ -14,6 +14,7 @@ from scipy import stats
 
 from inbounds.study.statistics.comparisons import welch_freedom
 from inbounds.study.statistics.seeds import Floats
+from inbounds.study.statistics.settings import SIGNIFICANCE
 
 Draw = Callable[[np.random.Generator, tuple[int, int]], Floats]
 
@@ -45,7 +46,7 @@ def power(
     n: int,
     rng: np.random.Generator,
     *,
-    level: float = 0.05,
+    level: float = SIGNIFICANCE,
     tests: int = 1,
     trials: int = 20_000,
     draw: Draw = standard_normal,
@@ -81,7 +82,7 @@ def smallest_detectable_effect(
     rng: np.random.Generator,
     *,
     chance: float = 0.8,
-    level: float = 0.05,
+    level: float = SIGNIFICANCE,
     tests: int = 1,
     trials: int = 20_000,
     draw: Draw = standard_normal,
