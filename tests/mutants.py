@@ -407,8 +407,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "orthogonal over all seeds at once",
         "learning/networks/perceptron.py",
-        "torch.nn.init.orthogonal_(layer.weight[s], head_gain",
-        "torch.nn.init.orthogonal_(layer.weight, head_gain",
+        "torch.nn.init.orthogonal_(layer.weight[s], gain",
+        "torch.nn.init.orthogonal_(layer.weight, gain",
         "tests/learning/networks/test_networks.py::test_orthogonal_initialisation_is_orthogonal_per_slice",
     ),
     Mutant(
@@ -1049,10 +1049,17 @@ MUTANTS: tuple[Mutant, ...] = (
         "tests/book/report/test_equal_start.py::test_a_quiet_start_is_advised_as_firmly_as_it_helps",
     ),
     Mutant(
+        "a suggested difference is told as none",
+        "book/report/answers.py",
+        '"suggested": f"suggested',
+        '"suggests": f"suggested',
+        "tests/book/report/test_equal_start.py::test_each_difference_is_told_with_its_grade",
+    ),
+    Mutant(
         "what a test does not find is counted as nothing",
         "book/report/words.py",
-        'parts += [told(side, side) for side in ("suggested above", "suggested below") if side in where]',
-        "pass",
+        'for word in ("suggested above", "suggested below", "too small to matter", WAITS)',
+        'for word in ("too small to matter", WAITS)',
         "tests/book/report/test_words.py::test_each_robot_is_counted_once",
     ),
     Mutant(

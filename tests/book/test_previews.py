@@ -46,7 +46,7 @@ def test_a_book_has_one_script_a_page_with_targets(tmp_path: Path) -> None:
         "notebooks.a.html.js",
     ]
     script = (home / "book.b.html.js").read_text(encoding="utf8")
-    assert script.startswith('inbounds.previews.come("book/b.html", {"term-box": ')
+    assert script.startswith('inbounds.previews.come("book/b.html", {"term-box":')
     assert "</" not in script  # nothing ends the script early
     before = (tmp_path / "notebooks" / "a.html").read_text(encoding="utf8")
     assert before.count('src="../_static/previews/hover.js"') == 1

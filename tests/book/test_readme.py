@@ -58,9 +58,11 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
 
 
 def test_a_law(outcomes: Outcomes) -> None:
-    rows = answers.of(laws(outcomes_of_both(outcomes)), algorithm="ppo")
-    assert answers.advice(rows, "ppo") == "Under PPO no law leads: keep your library's law."
-    said = bullet("Then, under PPO, keep your library's law.")
+    every = laws(outcomes_of_both(outcomes))
+    for algorithm in ("ppo", "trpo"):
+        assert answers.advice(every, algorithm).endswith(" no law leads: keep your library's law.")
+    rows = answers.of(every, algorithm="ppo")
+    said = bullet("Then keep your library's law.")
     graded = {
         (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)
         for law in ("beta", "logit-normal")
@@ -73,7 +75,9 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert not graded["beta", "final", -1]
     assert graded["beta", "area", 1] == {"found": 1, "suggested": 1}
     assert graded["beta", "area", -1] == {"suggested": 1}
-    assert "Both quiet, a Beta ends above a Gaussian on 2 of 6 robots (found), below on none;" in said
+    assert (
+        "Under PPO, both quiet, a Beta ends above a Gaussian on 2 of 6 robots (found), below on none;" in said
+    )
     assert "over all of training it earns more on 2 (one found), less on 1 (suggested)." in said
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found": 1}

@@ -5,9 +5,18 @@ import dataclasses
 import pytest
 
 from inbounds.book.report import answers, winners
-from inbounds.book.report.equal_start import Evidence, grade, laws, outcomes_of_both, quiet_starts
+from inbounds.book.report.equal_start import (
+    Evidence,
+    exploratory,
+    grade,
+    laws,
+    outcomes_of_both,
+    quiet_starts,
+)
+from inbounds.study import statistics
 from inbounds.study.grid import AFTERWARDS, ROBOTS, SECOND, select
-from inbounds.study.outcomes import Outcomes
+from inbounds.study.outcomes import Column, Outcomes
+from inbounds.study.second import GAUSSIAN, Pair, compared
 from inbounds.study.store import StudyFolder
 from tests.book.report.made_up import gap
 from tests.study.small import folder_in
@@ -53,13 +62,23 @@ def test_grades_of_the_second_study(changed: dict, word: str) -> None:
 
 def test_what_is_too_small_to_matter_is_not_called_no_difference() -> None:
     small = dataclasses.replace(SECOND_ONE, difference=gap(10, 90))
-    assert answers.counted([SECOND_ONE, small]) == (
-        "above on 1 of 2 robots (found), below on 0, too small to matter on 1"
-    )
-    assert answers.counted([small]).endswith("too small to matter on 1")
     assert winners.field([small]) == "too small to matter; logit-normal not run"
-    weak = dataclasses.replace(SECOND_ONE, whole=False)
-    assert answers.in_brackets([weak, SECOND_ONE, small]) == " (found on 1, suggested on 1)"
+
+
+def test_each_difference_is_told_with_its_grade() -> None:
+    changes = {
+        "Hopper": {},
+        "Ant": {"difference": gap(10, 90)},
+        "Swimmer": {"whole": False},
+        "Walker2d": {"whole": False, "difference": gap(-900, -300)},
+        "Humanoid": {"difference": gap(-90, 900), "p_adjusted": 0.2},
+        "HalfCheetah": {"difference": gap(-9000, -3000)},
+    }
+    rows = [dataclasses.replace(SECOND_ONE, robot=robot, **changed) for robot, changed in changes.items()]
+    assert answers.counted(rows) == (
+        "above on 1 of 6 robots (Hopper), below on 1 (HalfCheetah), suggested above on 1 (Swimmer), "
+        "suggested below on 1 (Walker2d), too small to matter on 1 (Ant), no difference found on 1"
+    )
 
 
 @pytest.fixture
@@ -92,6 +111,16 @@ def test_the_grade_changes_as_cells_arrive(folder: StudyFolder) -> None:
     write_cells(folder, [cell for cell in SECOND["B, more seeds"] if cell.id in more])
     whole = of_the_beta(folder)
     assert (whole.whole, whole.difference.n, grade(whole)) == (True, 20, "found")
+
+
+def test_what_no_protocol_tests_is_not_tested(folder: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("equal-ant-ppo-gaussian-free-std", "equal-ant-ppo-beta")
+    write_cells(folder, [cell for cell in SECOND["B"] if cell.id in names])
+    outcomes = outcomes_of_both(Outcomes.read(folder))
+    expected = compared(outcomes, Pair(Column("equal", "ppo", "beta"), GAUSSIAN), "final")["Ant"]
+    monkeypatch.setattr(statistics, "permutation_test", lambda *_, **__: pytest.fail("permuted"))
+    (found,) = exploratory(outcomes, GAUSSIAN, "final")
+    assert (found.difference, found.whole) == (expected.difference, False)
 
 
 def test_a_quiet_start_waits_for_the_second_study(folder: StudyFolder) -> None:

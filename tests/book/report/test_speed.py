@@ -32,7 +32,7 @@ def rows(html: str) -> list[list[str]]:
     return [
         [
             cell.replace("<br>", " ").partition(">")[2].partition("<")[0]  # of several lines
-            for cell in row.split("<td")[1:]
+            for cell in re.split("<t[hd]", row)[1:]
         ]
         for row in body.split("<tr>")[1:]
     ]

@@ -1,6 +1,7 @@
 """The chapters' views of the study: the report's own parts, the same stored text with cells and without."""
 
 import dataclasses
+import re
 from collections import Counter
 from html import unescape
 from pathlib import Path
@@ -18,7 +19,7 @@ from inbounds.book.report.words import pair_name
 from inbounds.study import analysis, select
 from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
-from inbounds.study.ledger import CLAIMS, claims_named, judge, quotes
+from inbounds.study.ledger import CLAIMS, claims_named, computed, judge, quotes
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.words import spoken, verdict
 from tests.study.small import folder_in
@@ -87,8 +88,8 @@ def test_the_chapters_show_what_the_report_shows(some: Outcomes, tmp_path: Path)
 def cells(view: Shown) -> list[list[str]]:
     return [
         [
-            unescape(cell.partition(">")[2].partition("</td>")[0].replace("<br>", "\n"))
-            for cell in row.split("<td")[1:]
+            unescape(cell.partition(">")[2].partition("</t")[0].replace("<br>", "\n"))
+            for cell in re.split("<t[hd]", row)[1:]
         ]
         for row in view.html.partition("<tbody>")[2].split("<tr>")[1:]
     ]
@@ -183,6 +184,12 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
     assert "1 refuted, 1 undecided, 1 not tested" in ledger_table.counted(thesis)
     assert ledger_table.counted(found[:1]).startswith("1 claim: ")
     assert "Refuted: " in study_pages.decided(found).html
+
+
+def test_the_caption_says_what_a_time_is_repeated_over() -> None:
+    claims_named(["fisher-time"])
+    assert computed._REPEATS == 10
+    assert "intervals over seeds, of fisher-time over ten repeats;" in study_pages.ledger([]).html
 
 
 def test_the_middle_seed_is_in_the_middle(some: Outcomes) -> None:

@@ -1,5 +1,6 @@
 """The report says what there is, calls missing what is not, and needs no other file."""
 
+import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -227,9 +228,22 @@ def test_numbers_in_words(make: Callable[[], str], said: str) -> None:
 
 
 def test_text_is_escaped_and_alt_text_is_asked_for() -> None:
-    assert "<td>a &lt; b</td>" in html.table("Caption.", ["x", "y"], [["", "a < b"]])
+    table = html.table("Caption.", ["x", "y"], [["", "a < b"]])
+    assert "<td>a &lt; b</td>" in table
+    assert 'scope="row"' not in table  # nothing heads nothing
     with pytest.raises(ValueError, match="too short"):
         html.figure_of(lambda narrow: mpl.figure.Figure(), "A figure")
+
+
+def test_the_first_word_of_a_row_heads_it() -> None:
+    table = html.table("Caption.", ["x", "y"], [["Ant", "5"], ["Hopper", "6"]])
+    assert re.findall(r"<(t[hd])(.*?)>(.*?)</t[hd]>", table.partition("<tbody>")[2]) == [
+        ("th", ' scope="row" class="words"', "Ant"),
+        ("td", "", "5"),
+        ("th", ' scope="row" class="words"', "Hopper"),
+        ("td", "", "6"),
+    ]
+    assert 'scope="row"' not in html.table("Caption.", ["x", "y"], [["1", "word"]], words=(1,))
 
 
 def test_a_file_that_cannot_be_written_is_a_clear_line(

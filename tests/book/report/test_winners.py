@@ -1,6 +1,5 @@
 """Who wins, in words: the laws by their intervals, what was not run, and links to a place that exists."""
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -69,30 +68,3 @@ def test_each_field_leads_to_the_row_of_its_robot_and_algorithm() -> None:
     sources = [cell.source for cell in cells if cell.cell_type == "code"]
     for algorithm in winners.ALGORITHMS:
         assert f'answers.by_endpoint(rows, "{algorithm}")' in sources
-
-
-def test_the_finding_follows_the_rows() -> None:
-    rows = [row("beta", 4, 9), row("beta", -5, 5, robot="Hopper")]
-    said = winners.finding(winners.by_test(["higher", "lower", ""]), rows, "beta", "ppo")
-    assert said == (
-        "From the usual starts, under PPO, the Beta is found above the clipped Gaussian on 1 of 3 robots and below it "
-        "on 1. "
-        "When both start equally quiet, the Beta ends above on 1 of 2 robots (found) and below on none; "
-        "on 1 no difference is found."
-    )
-    areas = [row("beta", -9, -4), row("beta", 2, 3, robot="Hopper")]
-    areas = [dataclasses.replace(each, endpoint="area") for each in areas]
-    told = winners.finding("x", [*rows, *areas], "beta", "ppo")
-    assert told.endswith(
-        "on none; on 1 no difference is found. By the area under the learning curve it is above on 1 (found) and below "
-        "on 1 (found)."
-    )
-    fresh = [dataclasses.replace(each, study=2) for each in rows]
-    free = "a Gaussian whose σ is the same in every state, both start equally quiet: there the Beta"
-    assert free in winners.finding("x", fresh, "beta", "ppo")
-    assert free not in winners.finding("x", [rows[0], fresh[1]], "beta", "ppo")
-    small = dataclasses.replace(fresh[0], difference=row("beta", 0.1, 0.2).difference, primary=True)
-    told = winners.finding("x", [small], "beta", "ppo")
-    assert told.endswith("below on none; on 1 a difference, if there is one, is too small to matter.")
-    assert "(" not in winners.finding("x", rows[1:], "beta", "ppo").partition("quiet")[2]
-    assert "not compared yet" in winners.finding("x", [], "beta", "ppo")

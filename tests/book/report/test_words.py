@@ -8,12 +8,12 @@ from inbounds.book.report.words import WAITS, by_robot
 @pytest.mark.parametrize(
     ("verdicts", "said"),
     [
-        ({"Ant": "unresolved"}, "above on 0 of 1 robot, below on 0, no difference found on 1"),
-        ({"Ant": "higher", "Hopper": "higher"}, "above on 2 of 2 robots (Ant, Hopper), below on 0"),
+        ({"Ant": "unresolved"}, "above on none of 1 robot, below on none, no difference found on 1"),
+        ({"Ant": "higher", "Hopper": "higher"}, "above on 2 of 2 robots (Ant, Hopper), below on none"),
         (
             {"Ant": "lower", "Hopper": "suggested above", "Swimmer": "unresolved", "Humanoid": WAITS},
-            "above on 0 of 4 robots, below on 1 (Ant), suggested above on 1 (Hopper), "
-            "no difference found on 1, seeds still to be run on 1 (Humanoid)",
+            "above on none of 4 robots, below on 1 (Ant), suggested above on 1 (Hopper), "
+            "seeds still to be run on 1 (Humanoid), no difference found on 1",
         ),
     ],
 )

@@ -6,7 +6,6 @@ first_choice(of(rows, algorithm="ppo"))
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
@@ -15,7 +14,7 @@ from inbounds.book.report.forests import SERIES, Bar, in_words, of_robots
 from inbounds.book.report.html import Shown
 from inbounds.book.report.rows import of as of
 from inbounds.book.report.ways_to_act import BOUNDED
-from inbounds.book.report.words import HEADS, robots
+from inbounds.book.report.words import HEADS, by_robot
 from inbounds.study.grid import ROBOTS
 from inbounds.study.second.yardsticks import ENDPOINTS
 from inbounds.study.words import spoken
@@ -101,26 +100,24 @@ def start_advice(rows: Sequence[Evidence]) -> str:
 
 
 def counted(rows: Sequence[Evidence]) -> str:
-    """Return on how many robots the differences lie where, and how well founded; says so where there are none.
+    """Return on which robots the differences are found, suggested or too small to matter; says so where there are none.
 
     Example:
         >>> counted([])
         'not run yet'
     """
-    if not rows:
-        return "not run yet"
-    above, below = sides(rows)
-    small = sum(map(too_small, rows))
-    told = [
-        f"above on {len(above)} of {robots(len(rows))}{in_brackets(above)}",
-        f"below on {len(below)}{in_brackets(below)}",
-    ]
-    left = len(rows) - len(above) - len(below) - small
-    if small:
-        told.append(f"too small to matter on {small}")
-    if left:
-        told.append(f"no difference found on {left}")
-    return ", ".join(told)
+    return by_robot([(row.robot, _verdict(row)) for row in rows])
+
+
+def _verdict(row: Evidence) -> str:
+    """Return what a difference shows, in the words that `by_robot` sorts by."""
+    above = row.difference.value > 0
+    sorted_by: Mapping[str, str] = {
+        "found": "higher" if above else "lower",
+        "suggested": f"suggested {'above' if above else 'below'}",
+        "no difference found": "unresolved",
+    }
+    return sorted_by.get(grade(row), grade(row))
 
 
 def short(rows: Sequence[Evidence]) -> str:
@@ -146,23 +143,6 @@ def sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
     """
     above, below = ([row for row in rows if sign(row) == way] for way in (1, -1))
     return above, below
-
-
-def in_brackets(rows: Sequence[Evidence]) -> str:
-    """Return how well differences are founded that leave out 0, in brackets, the best grade first; empty for none.
-
-    Example:
-        >>> import numpy as np
-        >>> from inbounds.study.statistics import Estimate
-        >>> ahead = Estimate(np.array(9.0), np.array(4.0), np.array(14.0), 10, 0, 0.95, "difference of means")
-        >>> in_brackets([Evidence("Ant", "ppo", "beta", "final", ahead, study=1)])
-        ' (suggested)'
-    """
-    counts = Counter[str](map(grade, rows))
-    known = [word for word in ("found", "suggested") if counts[word]]
-    if len(known) > 1:
-        known = [f"{word} on {counts[word]}" for word in known]
-    return f" ({', '.join(known)})" if known else ""
 
 
 def leading(rows: Sequence[Evidence], *, graded: bool = True) -> str:

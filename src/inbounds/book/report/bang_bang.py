@@ -8,16 +8,15 @@ From `results/evaluations` (`inbounds.study.ways_played`): nothing is played her
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from inbounds.book.report.ways_to_act import Counts, Row, count, gain, in_words
+from inbounds.book.report.ways_to_act import Row, gain, in_words
 from inbounds.study.grid import ROBOTS, all_cells
-from inbounds.study.statistics import Estimate
 from inbounds.study.store import StudyFolder
-from inbounds.study.ways_played import NOTHING, evaluated, read_nothing, read_ways
+from inbounds.study.ways_played import evaluated, read_ways
 
 WAYS: Mapping[str, str] = {"median-snapped": "median, snapped", "sample-snapped": "sample, snapped"}
 """What is compared with the median as it is, and its panel's title."""
@@ -28,15 +27,13 @@ ENOUGH = 10
 
 @dataclass(frozen=True)
 class BangBangRow(Row):
-    """What a cell's policies earn at the bounds; its gains have the keys of `WAYS` and "nothing".
+    """What a cell's policies earn at the bounds; its gains have the keys of `WAYS`.
 
     Made by `rows_of`, which has an example.
     """
 
     at_bounds: float
     """Share of the median's action components within 0.1 % of a bound, a mean over seeds."""
-    half_of_range: float
-    """The median's median |action|, in units of half the range, a mean over seeds."""
     reversals: Mapping[str, float]
     """By way to act: share of action components of another sign than a step before, a mean over seeds."""
 
@@ -50,37 +47,21 @@ def rows_of(folder: StudyFolder) -> list[BangBangRow]:
         >>> hopper.found("median-snapped")
         -1
     """
-    nothing = read_nothing(folder)
     rows = []
     for cell in evaluated(folder, all_cells()):
         if len(cell.kept_seeds) < ENOUGH:
             continue
         ways = read_ways(folder, cell)
         median = ways["median"].returns.mean(1)  # [S]
-        gains: dict[str, Estimate] = {way: gain(ways[way].returns.mean(1), median) for way in WAYS}
-        gains[NOTHING] = gain(nothing[cell.robot].mean(1), median)
-        actions = ways["median"].actions
+        gains = {way: gain(ways[way].returns.mean(1), median) for way in WAYS}
         rows.append(
             BangBangRow(
                 cell.robot,
                 in_words(cell),
                 cell.family,
                 gains,
-                float(np.nanmean(actions["at_bounds"])),
-                float(np.nanmean(actions["abs_q50"])),
+                float(np.nanmean(ways["median"].actions["at_bounds"])),
                 {way: float(np.nanmean(played.actions["reversals"])) for way, played in ways.items()},
             )
         )
     return sorted(rows, key=lambda row: (ROBOTS.index(row.robot), row.label.count(","), row.label))
-
-
-def by_family(rows: Sequence[BangBangRow], way: str) -> dict[str, Counts]:
-    """Count, for each family, the cells in which a way is found below the median, or above.
-
-    Example:
-        >>> rows = rows_of(StudyFolder())  # in the project's folder
-        >>> sorted(by_family(rows, "median-snapped"))
-        ['beta', 'clipped-gaussian', 'gaussian', 'logit-normal']
-    """
-    families = dict.fromkeys(row.family for row in rows)
-    return {family: count([row for row in rows if row.family == family], way) for family in families}

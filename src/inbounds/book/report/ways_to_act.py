@@ -131,9 +131,15 @@ class Counts:
     most: float
     """The largest."""
 
+    @property
+    def told(self) -> str:
+        """What is counted, in words."""
+        left = self.cells - self.above - self.below
+        return f"above in {self.above} of {self.cells}, below in {self.below}, no difference found in {left}"
+
 
 def count(rows: Sequence[Row], way: str) -> Counts:
-    """Count the rows whose 95 % interval lies wholly on one side of zero.
+    """Count the rows in which a way to act is found below the median, or above it (`Row.found`).
 
     Args:
         rows: as `rows_of` returns them.

@@ -101,16 +101,16 @@ WAITS = "waits for seeds"
 
 
 def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
-    """Return on which robots a difference is found above 0 or below, or suggested, and on how many it is not.
+    """Return on which robots a difference is found above 0 or below, suggested or too small, and on how many it is not.
 
     Args:
-        verdicts: robot, and what `graded` says there.
+        verdicts: robot, and what `graded` says there, or *too small to matter*, or `WAITS`.
 
     Example:
         >>> by_robot([("Ant", "higher"), ("Hopper", "suggested below")])
-        'above on 1 of 2 robots (Ant), below on 0, suggested below on 1 (Hopper)'
+        'above on 1 of 2 robots (Ant), below on none, suggested below on 1 (Hopper)'
         >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
-        'above on 0 of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
+        'above on none of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
         >>> by_robot([])
         'not run yet'
     """
@@ -122,14 +122,16 @@ def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
 
     def told(name: str, word: str, size: str = "") -> str:
         found = where.get(word, [])
-        return f"{name} on {len(found)}{size}" + (f" ({', '.join(found)})" if found else "")
+        return f"{name} on {len(found) or 'none'}{size}" + (f" ({', '.join(found)})" if found else "")
 
     parts = [told("above", "higher", f" of {robots(len(verdicts))}"), told("below", "lower")]
-    parts += [told(side, side) for side in ("suggested above", "suggested below") if side in where]
+    parts += [
+        told("seeds still to be run" if word == WAITS else word, word)
+        for word in ("suggested above", "suggested below", "too small to matter", WAITS)
+        if word in where
+    ]
     if "unresolved" in where:
         parts.append(f"no difference found on {len(where['unresolved'])}")
-    if WAITS in where:
-        parts.append(told("seeds still to be run", WAITS))
     return ", ".join(parts)
 
 
