@@ -77,7 +77,6 @@ def test_families_differ_in_line_and_marker_too() -> None:
 def test_unknown_family_names_the_known_ones() -> None:
     with pytest.raises(ValueError, match="clipped-gaussian"):
         figures.family_style("normal")
-    assert figures.family_style("gaussian", markers=5)["markevery"] == 5
 
 
 def test_style_is_given_back() -> None:

@@ -168,15 +168,14 @@ def use_style() -> AbstractContextManager[None]:
     return _Restore(before)
 
 
-def family_style(family: str, *, markers: int | None = None) -> dict[str, Any]:
+def family_style(family: str) -> dict[str, Any]:
     """Keyword arguments for `Axes.plot` that draw a policy family in its own look.
 
     Args:
         family: A key of `LOOKS`.
-        markers: Draw the family's marker at every so many points; None draws a bare line.
 
     Returns:
-        `color`, `linestyle` and `label`, and with markers `marker` and `markevery`.
+        `color`, `linestyle` and `label`.
 
     Raises:
         ValueError: If there is no such family.
@@ -188,10 +187,7 @@ def family_style(family: str, *, markers: int | None = None) -> dict[str, Any]:
     if family not in LOOKS:
         raise ValueError(f"no policy family {family!r}; choose one of {', '.join(LOOKS)}")
     look = LOOKS[family]
-    style: dict[str, Any] = {"color": look.color, "linestyle": look.linestyle, "label": look.label}
-    if markers is not None:
-        style |= {"marker": look.marker, "markevery": markers}
-    return style
+    return {"color": look.color, "linestyle": look.linestyle, "label": look.label}
 
 
 def density_panels(

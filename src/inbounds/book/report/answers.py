@@ -169,10 +169,10 @@ def bars(rows: Sequence[Evidence]) -> list[Bar]:
     return [Bar(row.robot, row.law, row.difference, row.margin, hollow=row.study == 1) for row in rows]
 
 
-def by_algorithm(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
-    """Return a forest with a panel an algorithm: each law against a Gaussian that starts equally quiet."""
-    panels = {a.upper(): of(rows, algorithm=a, endpoint=endpoint) for a in ("ppo", "trpo")}
-    what = f"each law against an equally quiet start, {ENDPOINTS[endpoint]}"
+def by_algorithm(rows: Sequence[Evidence]) -> Shown:
+    """Return a forest of final returns, a panel an algorithm: each law against a Gaussian that starts equally quiet."""
+    panels = {a.upper(): of(rows, algorithm=a, endpoint="final") for a in ("ppo", "trpo")}
+    what = f"each law against an equally quiet start, {ENDPOINTS['final']}"
     return html.of_study(what, _drawn(panels), *(_waiting(panels) if any(panels.values()) else []))
 
 

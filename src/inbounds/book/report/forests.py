@@ -98,7 +98,6 @@ def forest(
     panels: Mapping[str, Sequence[Bar]],
     *,
     xlabel: str,
-    band: float = 1.0,
     order: Sequence[str] = (),
     narrow: bool = False,
 ) -> Figure:
@@ -107,7 +106,6 @@ def forest(
     Args:
         panels: title → its bars; a group that one panel has, all show.
         xlabel: what the differences are measured in.
-        band: half the width of the grey band around zero; 0 draws none.
         order: of the groups; others follow as they come.
         narrow: one panel below the other, for a phone, in place of side by side.
 
@@ -137,7 +135,7 @@ def forest(
         shape = (len(panels), 1) if narrow else (1, len(panels))
         fig, axes = plt.subplots(*shape, figsize=size, sharey=True, sharex=True, squeeze=False)
         for ax, (title, found) in zip(axes.flat, panels.items(), strict=True):
-            ax.axvspan(-band, band, color=_BAND, alpha=0.6, linewidth=0)
+            ax.axvspan(-1, 1, color=_BAND, alpha=0.6, linewidth=0)
             ax.axvline(0, color=_QUIET, linewidth=1)
             for bar in found:
                 place = groups.index(bar.group) + _offset(kinds, bar.series)

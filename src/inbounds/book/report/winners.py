@@ -13,9 +13,9 @@ from inbounds.book.report.answers import lent, of, place_of, sign
 from inbounds.book.report.equal_start import LAWS, Evidence, grade
 from inbounds.book.report.html import Shown
 from inbounds.book.report.ways_to_act import BOUNDED
+from inbounds.book.report.words import ALGORITHMS
 from inbounds.study.grid import ROBOTS
 
-ALGORITHMS = ("ppo", "trpo")
 EVIDENCE = "what_happened.html"
 """The page that has a row of intervals for every field."""
 
@@ -50,14 +50,13 @@ def field(rows: Sequence[Evidence]) -> str:
     return "; ".join(told)
 
 
-def winners(rows: Sequence[Evidence], endpoint: str = "final") -> Shown:
+def winners(rows: Sequence[Evidence]) -> Shown:
     """Return the table of robots and algorithms that says who wins, each field a link to its own row of intervals.
 
     Args:
         rows: of `equal_start.laws`.
-        endpoint: final or area.
     """
-    here = of(rows, endpoint=endpoint)
+    here = of(rows, endpoint="final")
     if not here:
         return html.of_study("who wins", html.NONE_FINISHED)
     fields = {

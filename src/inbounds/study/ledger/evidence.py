@@ -109,11 +109,11 @@ def margin(outcomes: Outcomes, robot: str) -> float | None:
     return None if known is None or known[1] <= known[0] else MARGIN * (known[1] - known[0])
 
 
-def equals(contrast: Contrast, robots: Sequence[str], endpoint: str = "final") -> Evidence:
-    """Two families differ by less than the margin. For: all of the interval is within ±margin; against: none."""
+def equals(contrast: Contrast, robots: Sequence[str]) -> Evidence:
+    """Two final returns differ by less than the margin. For: all of the interval is within ±margin; against: none."""
 
     def find(outcomes: Outcomes) -> list[Statement]:
-        rows, found = analysis.differences(outcomes, contrast, endpoint), []
+        rows, found = analysis.differences(outcomes, contrast, "final"), []
         for robot in robots:
             about, gap = _about(contrast, robot), rows[robot].difference
             edge = margin(outcomes, robot)
