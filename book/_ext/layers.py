@@ -28,6 +28,24 @@ STUDY_FIGURE = re.compile(
     r"<figcaption>(?P<caption>.*?)</figcaption>",
     re.DOTALL,
 )
+# An alt text is written as it is read aloud; on the page it looks like the text around it.
+PRINTED = {
+    r"(?<=\d) percent\b": "\N{NO-BREAK SPACE}%",
+    r"\blog gamma\b": "log Γ",
+    r"\b[Aa]lpha\b": "α",
+    r"\bbeta\b": "β",
+    r"\bgamma\b": "γ",
+    r"\bdelta\b": "δ",
+    r"\bepsilon\b": "ε",
+    r"\b[Ll]ambda\b": "λ",
+    r"\bmu\b": "μ",
+    r"\b[Ss]igma\b": "σ",
+    r"\broot two\b": "√2",
+    r"δ (?=μ)": "Δ",
+    r"δ (?=log)": "Δ ",
+    r"([α-ω]) (?=\d|√|e\b|one eighth\b)": "\\1 = ",
+    r"([α-ω]) one\b": "\\1 = 1",
+}
 COLUMNS = re.compile(r"\S(?: {2,}|\t)\S")  # in a line that a program printed
 FIGURE = "inbounds-figure"  # the class that `inbounds.book.drawing.alt_text` gives a figure
 # Read before anything is drawn: what is folded must not be seen open first.
@@ -106,11 +124,19 @@ def let_sentences_wrap(app: Sphinx, doctree: nodes.document, docname: str) -> No
                     block["classes"].append("sentences")
 
 
+def as_printed(alt: str) -> str:
+    """Return an alt text as print has it: σ = 1 for sigma one, 95 % for 95 percent. A Beta, with its capital, is a law."""
+    for spelt, printed in PRINTED.items():
+        alt = re.sub(spelt, printed, alt)
+    return alt
+
+
 def caption(number: int, alt: str) -> str:
     """Return a figure's caption: what a reader hears who does not see the figure.
 
     The sentence that is shown is hidden from screen readers, which have read it as alt text already.
     """
+    alt = as_printed(alt)
     parts = [alt] if len(alt) <= LONGEST_CAPTION else re.split(r"(?<=[.!?])\s+(?=[A-Z])", alt, maxsplit=1)
     shown, rest = parts[0], parts[1] if len(parts) > 1 else ""
     fold = f"<details><summary>What it shows</summary><p>{html.escape(rest)}</p></details>" if rest else ""
@@ -122,7 +148,7 @@ def caption(number: int, alt: str) -> str:
 
 def study_figure(found: re.Match[str], number: int) -> str:
     """Return a figure that came as HTML with its number, and its alt text in a fold behind the caption that it has."""
-    alt = found["alt"]  # escaped already
+    alt = as_printed(found["alt"])  # escaped already
     return (
         f'{found["picture"]}<figcaption><span class="number">Figure {number}.</span> {found["caption"]}'
         f"<details><summary>What it shows</summary><p>{alt}</p></details></figcaption>"
