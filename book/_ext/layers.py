@@ -125,7 +125,7 @@ def let_sentences_wrap(app: Sphinx, doctree: nodes.document, docname: str) -> No
 
 
 def as_printed(alt: str) -> str:
-    """Return an alt text as print has it: σ = 1 for sigma one, 95 % for 95 percent. A Beta, with its capital, is a law."""
+    """Return an alt text as print has it: σ = 1 for sigma one, 95 % for 95 percent. A Beta, with its capital, stays."""
     for spelt, printed in PRINTED.items():
         alt = re.sub(spelt, printed, alt)
     return alt

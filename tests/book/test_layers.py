@@ -101,7 +101,10 @@ def test_figures_that_come_as_html_are_counted_with_the_others(layers: ModuleTyp
     [
         ("Sigma against mu, with 95 percent bands.", "σ against μ, with 95\N{NO-BREAK SPACE}% bands."),
         ("For sigma one and lambda 0.5, at sigma root two.", "For σ = 1 and λ = 0.5, at σ = √2."),
-        ("A Beta of alpha and beta; a percent of sigma up to one.", "A Beta of α and β; a percent of σ up to one."),
+        (
+            "A Beta of alpha and beta; a percent of sigma up to one.",
+            "A Beta of α and β; a percent of σ up to one.",
+        ),
         ("Steps of delta log sigma and of delta mu.", "Steps of Δ log σ and of Δμ."),
         ("In the plane of delta mu; delta times log gamma.", "In the plane of Δμ; δ times log Γ."),
     ],
