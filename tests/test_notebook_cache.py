@@ -1,8 +1,10 @@
 """Each notebook is executed once; what failed is executed again; who fills the cache and is ended leaves nothing."""
 
 import importlib.util
+import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -61,14 +63,16 @@ def test_a_notebook_is_executed_once_and_a_failing_one_again(
     code = "import os, sys; print(os.environ['INBOUNDS_BOOK_BUILD'], os.getcwd(), 'colorsys' in sys.modules)"
     good = write(tree, "good", code)
     bad = write(tree, "bad", "1 / 0")
-    stale = tree / "_build" / ".jupyter_cache" / "before"
-    stale.mkdir(parents=True)
     for _ in range(2):
         cache = notebook_cache.fill("now")
-    said = re.findall(r"of (\d)  (\w+)", capsys.readouterr().out)
-    assert (sorted(said[:2]), said[2:]) == ([("2", "bad"), ("2", "good")], [("1", "bad")])
+    told = capsys.readouterr().out
+    said = re.findall(r"of (\d)  (\w+\.ipynb(?: failed)?)  ", told)
+    assert (sorted(said[:2]), said[2:]) == (
+        [("2", "bad.ipynb failed"), ("2", "good.ipynb")],
+        [("1", "bad.ipynb failed")],
+    )
+    assert "\n1 of 2 failed: bad.ipynb\n" in told
     assert [len(file.read_text(encoding="utf8").split()) for file in (good, bad)] == [1, 2]
-    assert not stale.exists()
     kept = get_cache(cache).list_cache_records()
     assert [Path(record.uri).stem for record in kept] == ["good"]
     assert (
@@ -102,6 +106,70 @@ def test_who_reads_another_notebook_is_executed_again_when_that_has_changed(tree
     assert not page.exists()
     write(tree, "alone", "# other")
     assert executed() == [2, 2, 2, 3, 2]
+    # The cache has the first as it was; who has read the other one runs again, though its own cells are known.
+    write(tree, "first", "# ")
+    assert executed() == executed() == [2, 3, 3, 4, 2]
+
+
+@pytest.mark.slow
+def test_two_notebooks_that_go_back_apart_are_not_taken_for_what_they_were(tree: Path) -> None:
+    """The second one's cells are known, but were executed with the first as it was before."""
+    start = 'programs.start(globals(), "first")'
+    second = write(tree, "second", f"# {start}")
+    write(tree, "first", "# one")
+    notebook_cache.fill("now")
+    write(tree, "first", "# other")
+    write(tree, "second", f"# {start} too")
+    notebook_cache.fill("now")
+    write(tree, "second", f"# {start}")
+    notebook_cache.fill("now")
+    assert len(second.read_text(encoding="utf8").split()) == 3
+
+
+@pytest.mark.slow
+def test_outputs_that_were_not_written_to_their_end_are_made_again(tree: Path) -> None:
+    """A record is there before its file, and both before what says that they are whole."""
+    files = [write(tree, name) for name in ("cut", "lost")]
+    notes = notebook_cache.fill("now") / "read_of_others.json"
+    notes.write_text("{", encoding="utf8")
+    for path in notes.parent.glob("executed/*/base.ipynb"):
+        if "lost.txt" in path.read_text(encoding="utf8"):
+            path.unlink()
+    for _ in range(2):
+        notebook_cache.fill("now")
+    assert [len(file.read_text(encoding="utf8").split()) for file in files] == [2, 2]
+
+
+def test_the_last_three_folders_stay(tree: Path) -> None:
+    cached, drawn = tree / "_build" / ".jupyter_cache", tree / "_build" / ".doctrees"
+    there = []
+    for code in ("one", "two", "three", "one", "four", "four"):
+        drawn.mkdir(exist_ok=True, parents=True)
+        notebook_cache.fill(code)
+        there.append((sorted(path.name for path in cached.iterdir()), drawn.exists()))
+        time.sleep(0.02)  # the files' clock is coarse
+    assert there == [
+        (["one"], False),
+        (["one", "two"], False),
+        (["one", "three", "two"], False),
+        (["one", "three", "two"], False),
+        (["four", "one", "three"], False),
+        (["four", "one", "three"], True),
+    ]
+
+
+@pytest.mark.slow
+def test_what_took_longest_begins_first(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notebook_cache, "AT_ONCE", 1)
+    began = tree / "began"
+    for name in ("brief", "long", "new"):
+        write(tree, name, f"open({str(began)!r}, 'a').write('{name} ')")
+    (tree / ".cache").mkdir()
+    noted = tree / ".cache" / "seconds.json"
+    noted.write_text('{"brief.ipynb": 1, "long.ipynb": 100}', encoding="utf8")
+    notebook_cache.fill("now")
+    assert began.read_text(encoding="utf8") == "new long brief "
+    assert all(0 < seconds < 99 for seconds in json.loads(noted.read_text(encoding="utf8")).values())
 
 
 @pytest.mark.slow
@@ -117,16 +185,25 @@ def test_nothing_is_taken_out_of_a_cache_that_is_being_filled(
 
 
 @pytest.mark.slow
-def test_who_is_ended_leaves_no_process(tree: Path) -> None:
+@pytest.mark.parametrize("by", ["an end", "Ctrl-C"])
+def test_who_is_ended_leaves_no_process(tree: Path, by: str) -> None:
+    """Ctrl-C comes to all processes at once; none of the other notebooks is taken up then."""
     file = write(tree, "long", "import time; time.sleep(600)")
+    others = [write(tree, f"other{number}") for number in range(4)]
+    (tree / ".cache").mkdir()
+    seconds = {"long.ipynb": 100} | {f"{other.stem}.ipynb": 1 for other in others}
+    (tree / ".cache" / "seconds.json").write_text(json.dumps(seconds), encoding="utf8")
     code = (
-        "import forked_kernels, notebook_cache, sys; from pathlib import Path; forked_kernels.LIBRARIES = [];"
+        "import forked_kernels, notebook_cache, signal, sys; from pathlib import Path; forked_kernels.LIBRARIES = [];"
+        "signal.signal(signal.SIGINT, signal.default_int_handler);"  # in a shell's background it would be ignored
         "notebook_cache.ROOT = Path(sys.argv[1]); notebook_cache.BUILD = notebook_cache.ROOT / '_build';"
-        "notebook_cache.fill('now')"
+        "notebook_cache.AT_ONCE = 1; notebook_cache.fill('now')"
     )
     tools = str(Path(notebook_cache.__file__).parent)
     environment = os.environ | {"PYTHONPATH": tools}
-    with subprocess.Popen([sys.executable, "-c", code, str(tree)], env=environment) as filling:
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(tree)], env=environment, start_new_session=True
+    ) as filling:
         deadline = time.monotonic() + 120
         while not file.exists() or not file.read_text(encoding="utf8"):
             assert time.monotonic() < deadline, "the notebook never began"
@@ -135,10 +212,92 @@ def test_who_is_ended_leaves_no_process(tree: Path) -> None:
         begun = psutil.Process(filling.pid).children(recursive=True)
         assert kernel in begun
         assert len(begun) > 2, "no worker and no fork server"
-        filling.terminate()
+        if by == "Ctrl-C":
+            os.killpg(filling.pid, signal.SIGINT)
+        else:
+            filling.terminate()
     while any(there(each) for each in begun):
         assert time.monotonic() < deadline, "a process outlives the one that started it"
         time.sleep(0.1)
+    assert not any(other.exists() for other in others)
+
+
+def test_two_fill_one_after_the_other(tree: Path) -> None:
+    """The second says why it waits; the death of the first, too, lets go."""
+    code = (
+        "import notebook_cache, sys, time; from pathlib import Path; notebook_cache.ROOT = Path(sys.argv[1]);\n"
+        "with notebook_cache.alone(), notebook_cache.alone():\n"
+        "    print('has it', flush=True); time.sleep(600)"
+    )
+    environment = os.environ | {"PYTHONPATH": str(Path(notebook_cache.__file__).parent)}
+    command = [sys.executable, "-c", code, str(tree)]
+    processes = []
+    try:
+        for _ in range(2):
+            processes.append(
+                subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True, bufsize=1)
+            )
+            said = processes[-1].stdout.readline()
+            assert ("waiting for it" in said) == (len(processes) == 2), said
+        processes[0].kill()
+        assert processes[1].stdout.readline() == "has it\n"
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+PROJECT = '[build-system]\nrequires = []\n[project]\nname = "{}"\n[tool.ruff]\nline-length = {}\n'
+
+
+def test_only_what_a_notebook_can_read_counts(tree: Path) -> None:
+    def code() -> str:
+        return notebook_cache.digest(*notebook_cache.CODE)
+
+    def put(name: str, text: str) -> None:
+        path = tree / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf8")
+
+    put("pyproject.toml", PROJECT.format("a", 100))
+    before = code()
+    put("pyproject.toml", PROJECT.format("a", 110))
+    ignored = (Path(notebook_cache.__file__).parents[1] / ".gitignore").read_text(encoding="utf8").split()
+    leavings = [line.strip("/") for line in ignored if line.startswith("/benchmarks/")]
+    assert len(leavings) > 5
+    for name in leavings:
+        name = name.replace("*/", "a/")
+        put(name.replace("*", "a") if "." in name else f"{name}/a/a.json", "a")
+    for name in ("results/HISTORY.md", "benchmarks/README.md", "benchmarks/results/a.svg", "_toc.yml"):
+        put(name, "a")
+    assert code() == before
+    found = {before}
+    for name in (
+        "src/a.md",
+        "results/PROTOCOL.md",
+        "results/checksums.txt",
+        "results/cells/a.parquet",
+        "benchmarks/a.py",
+        "benchmarks/results/a.json",
+        "benchmarks/results/anchor/curves.parquet",
+        "benchmarks/results/engines/a/engines.json",
+        "constraints.txt",
+    ):
+        put(name, "a")
+        found.add(code())
+    put("pyproject.toml", PROJECT.format("b", 110))
+    assert len(found | {code()}) == 11
+
+
+def test_who_reads_the_contents_runs_again_with_them(tree: Path) -> None:
+    write(tree, "reads", 'open("../_toc.yml")')
+    write(tree, "alone")
+    (tree / "_toc.yml").write_text("root: a", encoding="utf8")
+    paths = [tree / "notebooks" / f"{name}.ipynb" for name in ("reads", "alone")]
+    before = [notebook_cache.read_of_others(path) for path in paths]
+    (tree / "_toc.yml").write_text("root: b", encoding="utf8")
+    after = [notebook_cache.read_of_others(path) for path in paths]
+    assert (before[0] != after[0], before[1], after[1]) == (True, "", "")
 
 
 def test_a_kernel_that_has_ended_by_itself_needs_no_signal() -> None:

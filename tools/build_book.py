@@ -39,16 +39,22 @@ PAGES = (
     "tools/forked_kernels.py",
     "tools/notebook_cache.py",
     "tools/student_copies.py",
+    "results/PROTOCOL-2.md",  # for download, like the first study's, which CODE has
+    "results/HISTORY.md",
     "CITATION.cff",
     "_config.yml",
     "_toc.yml",
 )
 
 
-def build(code: str) -> int:
-    """Execute the notebooks and run Jupyter Book, both told that the output is a static page."""
+def build(code: str, wanted: str) -> int:
+    """Execute the notebooks and run Jupyter Book, both told that the output is a static page.
+
+    Args:
+        code: digest of what the notebooks' outputs depend on.
+        wanted: what the pages shall be drawn by, as `drawn_by` says it.
+    """
     STAMP.unlink(missing_ok=True)
-    wanted = drawn_by()
     same = DRAWN_BY.exists() and DRAWN_BY.read_text() == wanted
     DRAWN_BY.unlink(
         missing_ok=True
@@ -130,7 +136,13 @@ def main() -> int:
     parser.add_argument("--zip", action="store_true", help="zip the built book into dist/")
     args = parser.parse_args()
 
-    if args.force:
+    with notebook_cache.alone():
+        return bring_up_to_date(args.force, args.zip)
+
+
+def bring_up_to_date(force: bool, to_zip: bool) -> int:
+    """Build what has changed, say what was done, and return the exit status."""
+    if force:
         shutil.rmtree(BUILD, ignore_errors=True)
     start, code = time.perf_counter(), digest(*CODE)
     everything = f"{code} {digest(*PAGES)}"
@@ -142,7 +154,8 @@ def main() -> int:
         stamp(everything, finish())
     else:
         print("Executing the notebooks and building the pages ...", flush=True)
-        if status := build(code):
+        wanted = drawn_by()  # as it is now: a title that is edited meanwhile is not drawn
+        if status := build(code, wanted):
             print(
                 "\nThe book was NOT built: see the messages above (a warning counts as an error).",
                 file=sys.stderr,
@@ -152,9 +165,9 @@ def main() -> int:
 
         student_copies.write_downloads(ROOT / "notebooks", INDEX.parent)
         stamp(everything, finish())
-        DRAWN_BY.write_text(drawn_by())
+        DRAWN_BY.write_text(wanted)
         print(f"Built in {time.perf_counter() - start:.0f} s.")
-    if args.zip:
+    if to_zip:
         print(f"Zipped: {zip_book()}")
     print(f"Open {INDEX}")
     return 0

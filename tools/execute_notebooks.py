@@ -1,15 +1,17 @@
-"""Execute notebooks from top to bottom and store their text outputs: python tools/execute_notebooks.py NOTEBOOK ..."""
+"""Execute notebooks from top to bottom and store their text outputs: python tools/execute_notebooks.py NOTEBOOK ...
 
-import subprocess
+One after another. Each is stored when it has been executed, without pictures; the first that fails ends the command,
+and stays as it was.
+"""
+
 import sys
 import time
 from pathlib import Path
 
 import forked_kernels
 import nbformat
+import notebook_hook
 from nbclient import NotebookClient
-
-HOOK = Path(__file__).with_name("notebook_hook.py")
 
 
 def main() -> int:
@@ -21,9 +23,9 @@ def main() -> int:
         path, start = Path(name), time.perf_counter()
         notebook = nbformat.read(path, as_version=4)
         NotebookClient(notebook, timeout=300, resources={"metadata": {"path": path.parent}}).execute()
-        nbformat.write(notebook, path)
+        notebook_hook.store(path, notebook_hook.text_of(notebook_hook.strip(notebook)))
         print(f"{path.name}: executed in {time.perf_counter() - start:.1f} s", flush=True)
-    return subprocess.run([sys.executable, HOOK, "--write", *sys.argv[1:]], check=False).returncode
+    return notebook_hook.main(["--check", *sys.argv[1:]])
 
 
 if __name__ == "__main__":

@@ -43,6 +43,19 @@ def strip(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return notebook
 
 
+def text_of(notebook: nbformat.NotebookNode) -> str:
+    """Return the text of a stripped notebook's file."""
+    nbformat.validate(notebook)
+    return nbformat.writes(notebook) + "\n"
+
+
+def store(path: Path, text: str) -> None:
+    """Write a notebook whole: on a full disk, or when we are killed, the only copy there is stays as it was."""
+    from inbounds.learning.storage.whole_files import write_whole  # not above: it brings PyTorch
+
+    write_whole(path, text.encode())
+
+
 def complaints(notebook: nbformat.NotebookNode) -> list[str]:
     """Return what keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
     found, expected = [*unknown_values(notebook), *glued_twice(notebook)], 1
@@ -123,10 +136,9 @@ def main(arguments: list[str] | None = None) -> int:
     for path in args.notebooks or sorted((ROOT / "notebooks").glob("*.ipynb")):
         stored = path.read_text(encoding="utf8")
         notebook = strip(nbformat.reads(stored, as_version=4))
-        nbformat.validate(notebook)
-        stripped = nbformat.writes(notebook) + "\n"
+        stripped = text_of(notebook)
         if args.write and stripped != stored:
-            path.write_text(stripped, encoding="utf8")
+            store(path, stripped)
         problems = complaints(notebook)
         if args.check and stripped != stored:
             problems.append("stores pictures, HTML or volatile metadata: run `make format`")

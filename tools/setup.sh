@@ -2,20 +2,35 @@
 # Creates .venv and installs the book from its pins. Safe to run again: it does nothing when all is in place, and
 # repairs what an interrupted run left behind. Called by every `make` target that needs it.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd -P "$(dirname "$0")/.."  # a link to this folder is no other place
 
 say() { printf '\033[1m%s\033[0m\n' "$*"; }
 fail() { printf 'set-up stopped: %s\n' "$*" >&2; exit 1; }
 
+version_of() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
+supported() { case "$1" in 3.11 | 3.12 | 3.13) ;; *) return 1 ;; esac; }
+
+# The Python that is named, or the newest of those that the tests run on.
 find_python() {
-  local candidate
-  for candidate in ${PYTHON:-} python3.13 python3.12 python3.11 python3; do
-    if command -v "$candidate" >/dev/null && "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+  local candidate version bare='' other='' candidates=(python3.13 python3.12 python3.11 python3)
+  if [ -n "${PYTHON:-}" ]; then
+    candidates=("$PYTHON")
+    version_of "$PYTHON" >/dev/null || fail "there is no Python that runs by the name of $PYTHON, which PYTHON gives"
+  fi
+  for candidate in "${candidates[@]}"; do
+    version=$(version_of "$candidate" 2>/dev/null) || continue
+    if ! supported "$version"; then
+      other=$version
+    elif ! "$candidate" -c 'import ensurepip, venv' 2>/dev/null; then
+      bare=${bare:-$version}
+    else
       command -v "$candidate"
       return
     fi
   done
-  fail "no Python 3.11 or newer found. Install it (Debian/Ubuntu: apt install python3 python3-venv) or name one: make PYTHON=/path/to/python3.12"
+  [ -z "$bare" ] || fail "Python $bare is here without what creates a virtual environment. On Debian/Ubuntu: apt install python$bare-venv"
+  [ -z "$other" ] || fail "Python 3.11, 3.12 or 3.13 is needed, ${PYTHON:-python3} is $other. Name one of them: make PYTHON=/path/to/python3.12"
+  fail "no Python 3.11, 3.12 or 3.13 found. Install one (Debian/Ubuntu: apt install python3 python3-venv) or name it: make PYTHON=/path/to/python3.12"
 }
 
 # True when MuJoCo's off-screen renderer has an OpenGL to load.
@@ -74,28 +89,54 @@ install_browsers() {
   esac
 }
 
-# What the stamp must say for the environment to be up to date.
-fingerprint() { { cat pyproject.toml constraints.txt apt.txt tools/setup.sh; .venv/bin/python -VV; pwd; } | cksum; }
+# What the stamp must say for the environment to be up to date. Of pyproject.toml only what pip reads: the rest sets up
+# the tools of who writes the book.
+fingerprint() {
+  { .venv/bin/python -c '
+import sys, tomllib
+with open("pyproject.toml", "rb") as file:
+    project = tomllib.load(file)
+print(sys.version, project["build-system"], project["project"], project.get("tool", {}).get("hatch"))'
+    cat constraints.txt apt.txt tools/setup.sh; pwd; } | cksum
+}
 
 stamp=.venv/.complete
-if [ -x .venv/bin/python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint 2>/dev/null)" ]; then
+up_to_date() { [ -x .venv/bin/python ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint 2>/dev/null)" ]; }
+if up_to_date; then
   install_browsers "${1:-}"
   exit 0
 fi
 
 [ ! -L .venv ] || fail ".venv is a link: setting up here would empty the environment it points to. Remove the link (rm .venv), and run the same command again"
 
-free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
-[ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
-[ "$free_kb" -gt 8000000 ] || say "Only $((free_kb / 1000000)) GB of disk are free: enough for PyTorch's CPU build (INSTALL.md says how to ask for it), not for the one with CUDA"
+# A folder that was moved or copied brings commands that call the Python of the old place: start anew. Where the path
+# has a space, pip's first line names a shell, and the second this place.
+at_home() { head -n 2 .venv/bin/pip 2>/dev/null | grep -qF -e "#!$PWD/.venv/" -e "\"$PWD/.venv/"; }
+sound() { at_home && supported "$(version_of .venv/bin/python 2>/dev/null)" && .venv/bin/python -c 'import pip' 2>/dev/null; }
 
-# A folder that was moved or copied brings commands that call the Python of the old place: start anew.
-at_home() { head -n 1 .venv/bin/pip 2>/dev/null | grep -qF "$PWD/.venv/"; }
-if ! at_home || ! .venv/bin/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+# One set-up at a time. The lock is on a file that this process has open: its end lets go of it, however it comes.
+python=.venv/bin/python
+sound || python=$(find_python)
+mkdir -p .cache
+exec 9>.cache/setup.lock
+lock() { "$python" -c "from fcntl import *; flock(9, $1)" 2>/dev/null; }
+lock 'LOCK_EX | LOCK_NB' || {
+  say "Another command sets up .venv here: waiting for it"
+  lock LOCK_EX || say "This disk has no locks: going on"
+}
+if up_to_date; then
+  install_browsers "${1:-}"
+  exit 0
+fi
+
+if ! sound; then
   python=$(find_python)
+  free_kb=$(df -Pk . | awk 'NR==2 {print $4}')
+  [ "$free_kb" -gt 4000000 ] || fail "the environment and the book need about 4 GB of disk, $((free_kb / 1000000)) GB are free here: make room, or clone to another disk"
+  [ "$free_kb" -gt 8000000 ] || say "Only $((free_kb / 1000000)) GB of disk are free: enough for PyTorch's CPU build (INSTALL.md says how to ask for it), not for the one with CUDA"
   say "Creating .venv with $("$python" -V)"
-  "$python" -m venv --clear .venv 2>/dev/null ||
-    fail "this Python cannot create a virtual environment. On Debian/Ubuntu: apt install python3-venv"
+  said=$("$python" -m venv --clear .venv 2>&1) ||
+    { tail -n 5 <<< "$said" >&2; fail "$python could not create a virtual environment, as it says above"; }
 fi
 rm -f "$stamp"
 # shellcheck disable=SC2046
@@ -103,7 +144,8 @@ install_system_packages .venv/bin/python $(xargs < apt.txt)
 say "Installing the pinned packages (the first time a few minutes to a quarter of an hour, a gigabyte or more to download)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[book,lab,test]' ||
   fail "pip could not install the packages. Check the network (or the proxy and index settings of pip), then run the same command again: it goes on where it stopped"
-.venv/bin/python -m pip check --disable-pip-version-check >/dev/null || fail "the installed packages contradict each other: run  make distclean  and try again"
+said=$(.venv/bin/python -m pip check --disable-pip-version-check 2>&1) ||
+  { tail -n 5 <<< "$said" >&2; fail "the installed packages contradict each other: run  make distclean  and try again"; }
 fingerprint > "$stamp"
 install_browsers "${1:-}"
 say "The environment is ready (.venv)"
