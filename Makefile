@@ -62,8 +62,8 @@ lab: setup  ## open JupyterLab on the chapters without solutions, in lab/ (your 
 	@$(PY) tools/student_copies.py lab
 	@$(PY) -m jupyterlab --notebook-dir=lab $(if $(filter 0,$(shell id -u)),--allow-root)
 
-bench: setup  ## measure speed beside peers and beside the physics floor  (about 25 min, quiet machine)
-	@$(PY) -m benchmarks.run
+bench: setup  ## measure speed beside peers (RLtools, SBX, CleanRL in peers/) and the physics floor  (about 25 min, quiet machine)
+	@$(PY) -m benchmarks.run $(if $(wildcard peers/bin/python),$(foreach who,sbx cleanrl rltools,--python $(who)-ppo=peers/bin/python))
 
 dist: book  ## zip the built book for reading offline
 	@$(PY) tools/build_book.py --zip

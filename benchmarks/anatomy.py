@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.work import ENVS, Work
-from benchmarks.worker import one_core
+from benchmarks.worker import one_core, own_cores
 
 EXAMPLES = """
 examples:
@@ -159,7 +159,7 @@ def anatomy(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure and print a table."""
+    """Pin this process to a core, measure, and print a table."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.anatomy",
         description=__doc__,
@@ -173,6 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--epochs", type=int, default=3, help="that are averaged (3)")
     parser.add_argument("--horizon", type=int, default=Work.horizon, help="env steps of a rollout (2048)")
     chosen = parser.parse_args(arguments)
+    one_core(max(own_cores(parser)))
     parts = anatomy(Work(chosen.env, chosen.horizon), chosen.seeds, chosen.algo, chosen.family, chosen.epochs)
     whole = sum(parts.values())
     table = Table(
@@ -186,7 +187,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    import os
-
-    one_core(max(os.sched_getaffinity(0)))
     main()

@@ -4,14 +4,13 @@ Both sides run stable-baselines3's PPO: one free σ per dimension, 1 at the star
 statistics, rewards as they are. Compared is, per seed, the area under the learning curve minus the first epoch's mean
 return of all seeds of both sides, by two one-sided tests within a margin that `results/PROTOCOL-2.md` fixed. What is
 finished is kept: an interrupted run goes on where it was, ours from its checkpoint, the peer's with the next seed.
+Stored verdicts are replaced only by as many seeds under the same settings; others go to `benchmarks/results/some`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -19,13 +18,12 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from rich.console import Console
 
 from benchmarks.equivalence import seeds_needed_within
-from benchmarks.run import machine, versions
+from benchmarks.published import RESULTS
 from benchmarks.side_by_side import OURS, PEER, Job, jobs, run_jobs
-from benchmarks.validate import ROOT, curves, plot
+from benchmarks.validate import about, curves, finish, place_beside, summary
 from inbounds.study import statistics
 from inbounds.study.running.many_cells import cores
 
@@ -53,7 +51,8 @@ def epochs_of(steps: int, horizon: int) -> int:
 def gains(table: pa.Table, env: str) -> tuple[dict[str, Any], float]:
     """Return each seed's area minus the start, by side, and the start: the first epoch's mean return of all seeds.
 
-    Epochs without a return take the last known one, as the study's protocols say.
+    Epochs without a return take the last known one, as the study's protocols say, at the end of a curve too: there
+    `equivalence.area`, which the validation uses, finds no area.
     """
     known = {who: statistics.carry_forward(curves(table, env, who)) for who in (OURS, PEER)}
     start = float(np.mean(np.concatenate([returns[:, 0] for returns in known.values()])))
@@ -75,9 +74,7 @@ def judge(table: pa.Table, env: str, margin: float) -> dict[str, Any]:
         so.
     """
     gain, start = gains(table, env)
-    verdict: dict[str, Any] = {"margin": margin, "start": start}
-    for who, values in gain.items():
-        verdict[who] = {"mean": values.mean(), "std": values.std(ddof=1), "gains": values.tolist()}
+    verdict: dict[str, Any] = {"margin": margin, "start": start, **summary(gain, "gains")}
     try:
         outcome = statistics.equivalence(gain[OURS], gain[PEER], margin)
         wider = statistics.equivalence(gain[OURS], gain[PEER], margin, level=0.025)
@@ -106,37 +103,6 @@ def sentence(env: str, verdict: Mapping[str, Any]) -> str:
     return said
 
 
-def finish(done: Sequence[Job]) -> dict[str, Any]:
-    """Gather the curves, judge, and write `curves.parquet`, `anchor.json` and `anchor.svg`.
-
-    Args:
-        done: jobs whose seeds are all finished, one per robot and side.
-
-    Returns:
-        What `anchor.json` holds.
-    """
-    import matplotlib.pyplot as plt
-
-    folder = done[0].folder
-    table = pa.concat_tables([pq.read_table(job.curve_file(seed)) for job in done for seed in job.seeds])
-    pq.write_table(table, folder / "curves.parquet")
-    verdicts = {env: judge(table, env, MARGINS[env]) for env in dict.fromkeys(job.env for job in done)}
-    results = {
-        "date": time.strftime("%Y-%m-%d", time.gmtime()),
-        "machine": machine(),
-        "versions": versions({}),
-        "engine": done[0].engine,
-        "seeds": {job.env: len(job.seeds) for job in done},
-        "env_steps": done[0].epochs * done[0].horizon,
-        "verdicts": verdicts,
-    }
-    (folder / "anchor.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf8")
-    fig, alt = plot(table, verdicts, lambda found: "; ".join(sentence(*each) for each in found.items()))
-    fig.savefig(folder / "anchor.svg", metadata={"Title": alt, "Date": None})
-    plt.close(fig)
-    return results
-
-
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Return the command line's choices, checked."""
     parser = argparse.ArgumentParser(
@@ -150,7 +116,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--engine", choices=("compiled", "autograd"), default="compiled", help="of our side")
     parser.add_argument("--workers", type=int, default=cores(), help="processes, one thread each")
     parser.add_argument("--nice", type=int, default=19, help="added to the processes' niceness (19)")
-    parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results" / "anchor")
+    parser.add_argument("--output", type=Path, default=RESULTS / "anchor")
     parser.add_argument(
         "--quick", action="store_true", help="2 seeds, 2 epochs of 1024 steps; writes to …/quick"
     )
@@ -184,9 +150,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for env in chosen.envs
         for who in (OURS, PEER)
     ]
+    asked = {"engine": chosen.engine, **about(sides)}
+    folder, why = place_beside(chosen.output / "anchor.json", asked)
+    if why:
+        console.print(why, soft_wrap=True)
     if todo := jobs(sides):
         run_jobs(todo, chosen.workers, console)
-    for env, verdict in finish(sides)["verdicts"].items():
+    results = finish(
+        sides,
+        folder / "anchor.json",
+        asked,
+        lambda table, env: judge(table, env, MARGINS[env]),
+        lambda found: "; ".join(sentence(*each) for each in found.items()),
+    )
+    for env, verdict in results["verdicts"].items():
         console.print(sentence(env, verdict), soft_wrap=True)
 
 

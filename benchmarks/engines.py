@@ -2,7 +2,8 @@
 
 Runs of the two engines part after a few updates, so they are compared as two sets of seeds are: by two one-sided tests
 on the areas under the curves (`benchmarks.equivalence`). The preset `common`, the logit-normal by default. What is
-finished is kept: an interrupted comparison goes on where it was.
+finished is kept: an interrupted comparison goes on where it was. Stored verdicts are replaced only by as many seeds
+under the same settings; others go to `benchmarks/results/some`.
 """
 
 from __future__ import annotations
@@ -17,16 +18,18 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from benchmarks.equivalence import area, equivalence, seeds_needed
+from benchmarks.equivalence import area
+from benchmarks.published import RESULTS, Extent, place, read, write_text
 from benchmarks.run import machine, versions
-from benchmarks.validate import Job, curves
+from benchmarks.validate import Job, compared, curves
 
-ROOT = Path(__file__).resolve().parents[1]
+HORIZON = 2048
 ORACLE, NEW = "autograd", "compiled"
 EXAMPLES = """
 examples:
   python -m benchmarks.engines                                  10 seeds a side, 150 epochs, two robots; about an hour
   python -m benchmarks.engines --seeds 30                       as many as the first run said that it takes
+  python -m benchmarks.engines --envs Hopper-v5 --seeds 40      what is stored
   python -m benchmarks.engines --envs Swimmer-v5 --epochs 30    a small one; three minutes
 """
 
@@ -49,12 +52,7 @@ def judge(done: Sequence[Job], margin: float) -> dict[str, Any]:
     rows = pa.concat_tables([pq.read_table(job.curve_file(seed)) for job in done for seed in job.seeds])
     areas = {job.who: area(curves(rows, job.env, job.who)) for job in done}
     verdict: dict[str, Any] = {who: values.tolist() for who, values in areas.items()}
-    try:
-        verdict |= dataclasses.asdict(equivalence(areas[NEW], areas[ORACLE], margin))
-        verdict["seeds_needed"] = seeds_needed(areas[NEW], areas[ORACLE], margin)
-    except ValueError as error:
-        verdict["undecided"] = str(error)
-    return verdict
+    return verdict | compared(areas[NEW], areas[ORACLE], margin)
 
 
 def in_words(env: str, verdict: dict[str, Any], margin: float) -> str:
@@ -73,6 +71,14 @@ def in_words(env: str, verdict: dict[str, Any], margin: float) -> str:
     )
 
 
+def held(file: Path) -> Extent | None:
+    """Return how much stored verdicts hold, or None if there are none."""
+    if (stored := read(file)) is None:
+        return None
+    settings = {"env_steps": stored["env_steps"], "horizon": stored.get("horizon", HORIZON)}
+    return Extent(dict.fromkeys(stored["verdicts"], stored["seeds"]), settings | {"margin": stored["margin"]})
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Train what is missing, judge, write `engines.json`, and print the verdicts."""
     parser = argparse.ArgumentParser(
@@ -84,16 +90,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--envs", nargs="+", default=["Hopper-v5", "HalfCheetah-v5"], help="ids of robots")
     parser.add_argument("--seeds", type=int, default=10, help="of each side (10)")
     parser.add_argument("--epochs", type=int, default=150, help="rollouts of each seed (150)")
-    parser.add_argument("--horizon", type=int, default=2048, help="env steps of a rollout (2048)")
+    parser.add_argument("--horizon", type=int, default=HORIZON, help="env steps of a rollout (2048)")
     parser.add_argument("--policy", default="logit-normal", help="the family (logit-normal)")
     parser.add_argument("--algo", default="ppo", help="ppo or trpo (ppo)")
     parser.add_argument("--margin", type=float, default=0.15, help="relative, of equivalence (0.15)")
-    parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results" / "engines")
+    parser.add_argument("--output", type=Path, default=RESULTS / "engines")
     chosen = parser.parse_args(arguments)
     if chosen.seeds < 2:
         parser.error("at least two seeds a side are needed")
     folder = chosen.output / f"{chosen.algo}-{chosen.policy}"
     (folder / "runs").mkdir(parents=True, exist_ok=True)
+    settings = {
+        "env_steps": chosen.epochs * chosen.horizon,
+        "horizon": chosen.horizon,
+        "margin": chosen.margin,
+    }
+    measured = Extent(dict.fromkeys(chosen.envs, chosen.seeds), settings)
+    target, why = place(folder, held(folder / "engines.json"), measured)
+    if why:
+        print(why, flush=True)
     verdicts = {}
     for env in chosen.envs:
         sides = [  # different seeds: the tests are for two independent samples
@@ -114,10 +129,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 train_side(dataclasses.replace(job, seeds=missing), chosen.policy, chosen.algo)
         verdicts[env] = judge(sides, chosen.margin)
         print(in_words(env, verdicts[env], chosen.margin), flush=True)
-    about = {"machine": machine(), "versions": versions({}), "seeds": chosen.seeds}
-    about |= {"env_steps": chosen.epochs * chosen.horizon, "margin": chosen.margin}
-    text = json.dumps({**about, "verdicts": verdicts}, indent=1)
-    (folder / "engines.json").write_text(text + "\n", encoding="utf8")
+    about = {"machine": machine(), "versions": versions({}), "seeds": chosen.seeds, **settings}
+    write_text(target / "engines.json", json.dumps({**about, "verdicts": verdicts}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -9,24 +9,22 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from scipy.optimize import brentq
 
+from inbounds.study import statistics
+
 
 def area(returns: ArrayLike) -> NDArray[np.float64]:
     """Return the area under learning curves per epoch: the mean over epochs, `[...]`, of `[..., epochs]`.
 
-    An epoch in which no episode ended (NaN) counts as the one before it; before the first that ended, not at all. A
+    Epochs in which no episode ended (NaN) are filled as the study's are (`statistics.carry_forward`). Unlike there, a
     curve that ends in NaN has no area: the run diverged or was cut short, and its last return says nothing of the rest.
 
     Example:
-        >>> area([[np.nan, 1.0, np.nan, 4.0], [1.0, 2.0, 3.0, np.nan]]).tolist()  # of 1, 1 and 4
-        [2.0, nan]
+        >>> area([[np.nan, 1.0, np.nan, 4.0], [1.0, 2.0, 3.0, np.nan]]).tolist()  # of 1, 1, 1 and 4
+        [1.75, nan]
     """
     curves = np.array(returns, float)
     curves[np.isnan(curves[..., -1])] = np.nan
-    for epoch in range(1, curves.shape[-1]):
-        missing = np.isnan(curves[..., epoch])
-        curves[..., epoch] = np.where(missing, curves[..., epoch - 1], curves[..., epoch])
-    known = ~np.isnan(curves)
-    return np.where(known, curves, 0).sum(-1) / np.where(known.any(-1), known.sum(-1), np.nan)
+    return statistics.area_under_curve(statistics.carry_forward(curves))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.contestants import CONTESTANTS
+from benchmarks.published import write_text
 
 
 @dataclass(frozen=True)
@@ -208,14 +209,19 @@ def plot(results: Mapping[str, Any]) -> tuple[Any, str]:
     return fig, alt
 
 
+def as_json(results: Mapping[str, Any], folder: Path) -> Path:
+    """Write `speed.json` alone, whole; return its path."""
+    path = folder / "speed.json"
+    write_text(path, json.dumps(results, indent=1) + "\n")
+    return path
+
+
 def write(results: Mapping[str, Any], folder: Path) -> list[Path]:
     """Write `speed.json`, `speed.md` and `speed.svg`; return their paths."""
     import matplotlib.pyplot as plt
 
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"speed.{suffix}" for suffix in ("json", "md", "svg")]
-    paths[0].write_text(json.dumps(results, indent=1) + "\n", encoding="utf8")
-    paths[1].write_text(markdown(results), encoding="utf8")
+    paths = [as_json(results, folder), *(folder / f"speed.{suffix}" for suffix in ("md", "svg"))]
+    write_text(paths[1], markdown(results))
     fig, alt = plot(results)
     fig.savefig(paths[2], metadata={"Title": alt, "Date": None})
     plt.close(fig)

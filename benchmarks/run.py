@@ -1,12 +1,15 @@
 """Measure steps per second over environment, inference and update: this engine, its peers, and the floor.
 
 Each contestant is a process of its own; all are pinned to one core and take turns, one training epoch at a time, so
-that whatever else the machine does meets all alike. One turn warms up, the others count.
+that whatever else the machine does meets all alike. One turn warms up, the others count. What is measured so far is
+written after each robot. The stored table is replaced only by one that has all that it has: a run of some, or one in
+which a contestant could not take part, goes to `benchmarks/results/some`.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import importlib.metadata
 import json
@@ -16,7 +19,7 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +28,10 @@ from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.contestants import CONTESTANTS
-from benchmarks.report import markdown, write
+from benchmarks.published import RESULTS, Extent, aside, place, read
+from benchmarks.report import as_json, markdown, write
 from benchmarks.work import ENVS, Work
+from benchmarks.worker import own_cores
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = (
@@ -43,6 +48,11 @@ PACKAGES = (
     "mkl",
     "numba",
 )
+HOW_TO_ADD = (
+    "`python -m benchmarks.run --help` says how to install peers into an environment `peers`; pass its interpreter by "
+    "--python NAME=peers/bin/python, as `make bench` does."
+)
+EVERYONE = ("floor", *CONTESTANTS)
 EXAMPLES = """
 examples:
   python -m benchmarks.run                                        everything; about twenty-five minutes
@@ -86,11 +96,12 @@ class Worker:
         message = self._answer()
         return message.get("unavailable")
 
-    def turn(self) -> dict[str, float]:
-        """Let it train for one epoch; return what it measured."""
+    def turn(self) -> dict[str, Any]:
+        """Let it train for one epoch; return what it measured, or that it is "unavailable", and why."""
         assert self._process.stdin is not None
-        self._process.stdin.write("turn\n")
-        self._process.stdin.flush()
+        with contextlib.suppress(BrokenPipeError):  # it has ended: the answer says why
+            self._process.stdin.write("turn\n")
+            self._process.stdin.flush()
         return self._answer()
 
     def close(self) -> None:
@@ -101,7 +112,7 @@ class Worker:
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
-        if not line:
+        if not line.endswith("\n"):  # it has ended, perhaps within a word
             _, errors = self._process.communicate()
             return {
                 "unavailable": errors.strip().splitlines()[-1] if errors.strip() else "it ended in silence"
@@ -118,8 +129,12 @@ def measure(
     core: int,
     pythons: Mapping[str, str],
     progress: Progress,
+    after_each: Callable[[dict[str, Any], dict[str, str]], None] = lambda *_: None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Let all contestants take turns on each environment.
+
+    One that ends before its last turn has no measurements there, and does not take part any more: its turns would be
+    fewer than those they are compared with.
 
     Args:
         envs: Gymnasium's ids.
@@ -129,6 +144,7 @@ def measure(
         core: that all are pinned to.
         pythons: interpreters by contestant; the others use this one.
         progress: shows how far it is.
+        after_each: is told after each environment what will be returned, as far as it is there.
 
     Returns:
         Measurements by environment and contestant, and why some are absent, by contestant.
@@ -136,8 +152,13 @@ def measure(
     unavailable: dict[str, str] = {}
     measurements: dict[str, Any] = {}
     task = progress.add_task("", total=len(envs) * len(names) * (repeats + 1))
+
+    def leave(name: str, why: str) -> None:
+        unavailable[name] = why
+        progress.console.print(f"{name} does not take part: {why}", markup=False, highlight=False)
+
     for env in envs:
-        workers = []
+        workers: list[Worker] = []
         measurements[env] = {}
         try:
             for name in names:
@@ -146,19 +167,49 @@ def measure(
                     python = pythons.get(name, sys.executable)
                     workers.append(worker := Worker(name, dataclasses.replace(work, env=env), core, python))
                     if (why := worker.ready()) is not None:
-                        unavailable[name] = why
-                        workers.pop().close()
+                        if not unavailable:
+                            progress.console.print(HOW_TO_ADD, markup=False, highlight=False)
+                        leave(name, why)
                 progress.advance(task)
             for repeat in range(repeats):
                 for worker in workers:
-                    progress.update(task, description=f"{env}: {worker.name}, repeat {repeat + 1}")
-                    measurements[env].setdefault(worker.name, []).append(worker.turn())
+                    if worker.name not in unavailable:
+                        progress.update(task, description=f"{env}: {worker.name}, repeat {repeat + 1}")
+                        turn = worker.turn()
+                        measurements[env].setdefault(worker.name, []).append(turn)
+                        if "unavailable" in turn:
+                            leave(worker.name, f"it ended on {env}: {turn['unavailable']}")
+                            del measurements[env][worker.name]
                     progress.advance(task)
             progress.advance(task, (len(names) - len(workers)) * repeats)
         finally:
             for worker in workers:
                 worker.close()
+        after_each(measurements, unavailable)
     return measurements, unavailable
+
+
+def extent(results: Mapping[str, Any]) -> Extent:
+    """Return how much a table holds: the turns of each contestant that there still is, and the work."""
+    turns = {
+        f"{name} on {env}": len(each)
+        for env, measured in results["measurements"].items()
+        for name, each in measured.items()
+        if name in EVERYONE and env in ENVS
+    }
+    return Extent(turns, json.loads(json.dumps(results["work"])))
+
+
+def asked(envs: Sequence[str], names: Sequence[str], repeats: int, work: Work) -> Extent:
+    """Return how much a run will measure if nobody is missing."""
+    measurements = {env: {name: range(repeats) for name in names} for env in envs}
+    return extent({"measurements": measurements, "work": dataclasses.asdict(work)})
+
+
+def held(folder: Path) -> Extent | None:
+    """Return how much the table in a folder holds, or None if there is none."""
+    stored = read(folder / "speed.json")
+    return None if stored is None else extent(stored)
 
 
 def versions(pythons: Mapping[str, str]) -> dict[str, str]:
@@ -198,58 +249,52 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    everyone = ["floor", *CONTESTANTS]
     parser.add_argument(
         "--envs", nargs="+", default=list(ENVS), choices=ENVS, metavar="ENV", help=", ".join(ENVS)
     )
     parser.add_argument(
         "--contestants",
         nargs="+",
-        default=everyone,
-        choices=everyone,
+        default=list(EVERYONE),
+        choices=EVERYONE,
         metavar="NAME",
-        help=", ".join(everyone),
+        help=", ".join(EVERYONE),
     )
     parser.add_argument("--repeats", type=int, default=5, help="turns of each contestant that count (5)")
     parser.add_argument("--horizon", type=int, default=Work.horizon, help="env steps of a rollout (2048)")
-    if not hasattr(os, "sched_getaffinity"):
-        parser.exit(
-            2, "benchmarks.run pins everything to one core, which takes Linux (a container will do)\n"
-        )
-    parser.add_argument(
-        "--core", type=int, default=max(os.sched_getaffinity(0)), help="to pin all to (the last)"
-    )
+    cores = own_cores(parser)
+    parser.add_argument("--core", type=int, default=max(cores), help="to pin all to (the last)")
     parser.add_argument(
         "--python", action="append", default=[], metavar="NAME=PATH", help="interpreter of one contestant"
     )
     parser.add_argument(
         "--output",
         type=Path,
-        default=ROOT / "benchmarks" / "results",
-        help="folder to write to (of some environments or contestants only: …/some)",
+        default=RESULTS,
+        help="folder to write to (less than the table that is there: …/some)",
     )
     parser.add_argument(
         "--quick", action="store_true", help="Hopper, 256 steps, one repeat; writes to …/quick"
     )
     chosen = parser.parse_args(arguments)
-    some = set(chosen.envs) != set(ENVS) or set(chosen.contestants) != set(everyone)
     if chosen.quick:
         chosen.envs, chosen.repeats, chosen.horizon = chosen.envs[:1], 1, 256
         chosen.output = chosen.output / "quick"
-    elif some and chosen.output == parser.get_default("output"):  # which holds the results of all
-        chosen.output = chosen.output / "some"
+    everything = held(chosen.output) or asked(ENVS, EVERYONE, 1, Work(env=""))
+    run = asked(chosen.envs, chosen.contestants, chosen.repeats, Work(env="", horizon=chosen.horizon))
+    chosen.output, chosen.why = place(chosen.output, everything, run)
     if chosen.horizon % Work.minibatch_size:
         parser.error(
             f"--horizon must be a multiple of the minibatch, {Work.minibatch_size}; got {chosen.horizon}"
         )
-    if chosen.core not in os.sched_getaffinity(0):
-        parser.error(f"--core {chosen.core} is not ours; choose one of {sorted(os.sched_getaffinity(0))}")
+    if chosen.core not in cores:
+        parser.error(f"--core {chosen.core} is not ours; choose one of {sorted(cores)}")
     if chosen.repeats < 1:
         parser.error("--repeats must be at least 1")
     chosen.pythons = {}
     for pair in chosen.python:
         name, _, path = pair.partition("=")
-        if name not in everyone or not Path(path).exists():
+        if name not in EVERYONE or not Path(path).exists():
             parser.error(
                 f"--python takes NAME=PATH with a contestant and an interpreter that exists, got {pair!r}"
             )
@@ -263,25 +308,39 @@ def main(arguments: Sequence[str] | None = None) -> None:
     work = Work(env="", horizon=chosen.horizon)
     # Read before the children add to it.
     about = {"machine": machine(), "versions": versions(chosen.pythons)}
+    words = ["python", "-m", "benchmarks.run", *(sys.argv[1:] if arguments is None else arguments)]
     console = Console()
+    if chosen.why:
+        console.print(chosen.why, soft_wrap=True)
+
+    def found(measurements: dict[str, Any], unavailable: dict[str, str]) -> dict[str, Any]:
+        return {
+            "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+            "command": shlex.join(words),
+            **about,
+            "work": dataclasses.asdict(work),
+            "repeats": chosen.repeats,
+            "unavailable": unavailable,
+            "measurements": measurements,
+        }
+
+    def keep(measurements: dict[str, Any], unavailable: dict[str, str]) -> None:
+        if len(measurements) < len(chosen.envs):  # not all robots: it must not replace a table of all
+            as_json(found(measurements, unavailable), aside(chosen.output))
+
     columns = (TextColumn("{task.description:44}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
-        measurements, unavailable = measure(
-            chosen.envs, chosen.contestants, work, chosen.repeats, chosen.core, chosen.pythons, progress
+        measured = measure(
+            chosen.envs, chosen.contestants, work, chosen.repeats, chosen.core, chosen.pythons, progress, keep
         )
-    words = ["python", "-m", "benchmarks.run", *(sys.argv[1:] if arguments is None else arguments)]
-    results = {
-        "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
-        "command": shlex.join(words),
-        **about,
-        "work": dataclasses.asdict(work),
-        "repeats": chosen.repeats,
-        "unavailable": unavailable,
-        "measurements": measurements,
-    }
-    paths = write(results, chosen.output)
+    results = found(*measured)
+    folder, why = place(chosen.output, held(chosen.output), extent(results))
+    paths = write(results, folder)
     console.print(Markdown(markdown(results)))
     console.print(*(str(path) for path in paths))
+    if why:
+        missing = ", ".join(results["unavailable"])
+        console.print(f"{why} {missing} did not take part. {HOW_TO_ADD}", soft_wrap=True, highlight=False)
 
 
 if __name__ == "__main__":

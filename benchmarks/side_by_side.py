@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import multiprocessing
 import os
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any, Literal
 
@@ -160,8 +160,23 @@ def jobs(whole: Sequence[Job]) -> list[Job]:
     return sorted(todo, key=lambda job: len(job.seeds), reverse=True)
 
 
-def run_jobs(todo: Sequence[Job], workers: int, console: Console) -> None:
-    """Do the jobs, each in a process of its own, and show how far they are."""
+def run_jobs(
+    todo: Sequence[Job], workers: int, console: Console, do: Callable[[Job], None] = work_off
+) -> None:
+    """Do the jobs, each in a process of its own, and show how far they are.
+
+    A job that fails is told at once, and the others go on. Whatever ends this early, as Ctrl-C does, ends the processes
+    too: the pool by itself would wait for them, and start jobs that it has handed out already.
+
+    Args:
+        todo: the jobs, in order.
+        workers: how many at a time.
+        console: to show it on.
+        do: does one job.
+
+    Raises:
+        RuntimeError: a job failed.
+    """
     context = multiprocessing.get_context("spawn")
     counter = context.Value("q", 0)
     os.environ.update(dict.fromkeys(THREADS, "1"))  # inherited by the processes
@@ -171,15 +186,36 @@ def run_jobs(todo: Sequence[Job], workers: int, console: Console) -> None:
         MofNCompleteColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
+    failures: list[BaseException] = []
+    others = multiprocessing.active_children()
     with (
         Progress(*columns, console=console) as progress,
         ProcessPoolExecutor(workers, context, _share, (counter,), max_tasks_per_child=1) as pool,
     ):
         task = progress.add_task("epochs × seeds", total=sum(len(job.seeds) * job.epochs for job in todo))
-        futures = [pool.submit(work_off, job) for job in todo]
-        while not all(future.done() for future in futures):
-            progress.update(task, completed=counter.value)
-            time.sleep(0.5)
-        progress.update(task, completed=counter.value)
-        for future in futures:
-            future.result()
+        try:
+            jobs_of = {pool.submit(do, job): job for job in todo}
+            left = set(jobs_of)
+            while left:
+                done, left = wait(left, timeout=0.5, return_when=FIRST_COMPLETED)
+                progress.update(task, completed=counter.value)
+                for future in done:
+                    if (error := future.exception()) is not None:
+                        job = jobs_of[future]
+                        seeds = ", ".join(map(str, job.seeds))
+                        console.print(f"{job.name}, seeds {seeds}, failed: {error!r}", markup=False)
+                        failures.append(error)
+                    if isinstance(error, BrokenProcessPool):  # and with it all the others
+                        raise error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            while ours := [child for child in multiprocessing.active_children() if child not in others]:
+                for process in ours:
+                    process.terminate()
+                for process in ours:
+                    process.join(1)
+            raise
+    if failures:
+        raise RuntimeError(
+            f"{len(failures)} of {len(todo)} jobs failed, as told above; the others are kept"
+        ) from failures[0]

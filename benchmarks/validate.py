@@ -3,7 +3,8 @@
 Both sides run stable-baselines3's defaults: one free σ per dimension, ε = 0.2, no entropy bonus, observations as they
 are (or, asked for, normalised), returns in training per epoch of 2048 steps. The areas under the curves are compared
 by two one-sided tests: are the means within 15 % of the peer's? What is finished is kept: an interrupted validation
-goes on where it was.
+goes on where it was. Stored verdicts are replaced only by as many seeds under the same settings; others go to
+`benchmarks/results/some`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import argparse
 import dataclasses
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +25,16 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from benchmarks.equivalence import area, equivalence, seeds_needed
+from benchmarks.published import RESULTS, Extent, place, read, write_text
 from benchmarks.run import machine, versions
 from benchmarks.side_by_side import OURS, PEER, Job, jobs, run_jobs
 from inbounds.study.running.many_cells import cores
 
-ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = """
 examples:
   python -m benchmarks.validate                       10 seeds, 307 200 steps, two robots; about 45 minutes on two cores
   python -m benchmarks.validate --seeds 20            ten more seeds than before: what is there is not run again
-  python -m benchmarks.validate --seeds 10 20         ten on Hopper, twenty on HalfCheetah
+  python -m benchmarks.validate --seeds 10 20         ten on Hopper, twenty on HalfCheetah, as is stored
   python -m benchmarks.validate --quick               does it run? half a minute
 """
 
@@ -46,18 +47,24 @@ def curves(table: pa.Table, env: str, who: str) -> NDArray[np.float64]:
     return rows["return_mean"].to_numpy().reshape(len(rows["seed"].unique()), -1)
 
 
+def summary(values: Mapping[str, NDArray[np.float64]], name: str) -> dict[str, Any]:
+    """Return each side's mean, standard deviation, and its values under their name, one a seed."""
+    return {who: {"mean": a.mean(), "std": a.std(ddof=1), name: a.tolist()} for who, a in values.items()}
+
+
+def compared(ours: NDArray[np.float64], theirs: NDArray[np.float64], margin: float) -> dict[str, Any]:
+    """Return ratio, interval, p-value, verdict and seeds needed; or as `undecided` why there is none."""
+    try:
+        found = dataclasses.asdict(equivalence(ours, theirs, margin))
+        return found | {"seeds_needed": seeds_needed(ours, theirs, margin)}
+    except ValueError as error:
+        return {"undecided": str(error)}
+
+
 def judge(table: pa.Table, env: str, margin: float) -> dict[str, Any]:
     """Return the verdict on one robot: areas, ratio, interval, p-value; or why there is none."""
     areas = {who: area(curves(table, env, who)) for who in (OURS, PEER)}
-    verdict: dict[str, Any] = {
-        who: {"mean": a.mean(), "std": a.std(ddof=1), "areas": a.tolist()} for who, a in areas.items()
-    }
-    try:
-        verdict |= dataclasses.asdict(equivalence(areas[OURS], areas[PEER], margin))
-        verdict["seeds_needed"] = seeds_needed(areas[OURS], areas[PEER], margin)
-    except ValueError as error:
-        verdict["undecided"] = str(error)
-    return verdict
+    return summary(areas, "areas") | compared(areas[OURS], areas[PEER], margin)
 
 
 def facts(verdicts: dict[str, Any]) -> str:
@@ -97,35 +104,64 @@ def plot(
     return fig, f"{shown}: {say(verdicts)}."
 
 
-def finish(done: Sequence[Job], margin: float) -> dict[str, Any]:
-    """Gather the curves, judge, and write `curves.parquet`, `validation.json` and `validation.svg`.
+def about(done: Sequence[Job]) -> dict[str, Any]:
+    """Return how much the jobs train, as results say it: `seeds` by robot, and `env_steps` of each."""
+    return {
+        "seeds": {job.env: len(job.seeds) for job in done},
+        "env_steps": done[0].epochs * done[0].horizon,
+    }
+
+
+def place_beside(file: Path, asked: Mapping[str, Any]) -> tuple[Path, str]:
+    """Return the folder for results that are meant to replace a file, and why if it is another.
+
+    Args:
+        file: JSON with `seeds` by robot.
+        asked: the part of the new results that says how much they measure: `seeds`, and settings.
+    """
+    stored = read(file)
+    settings = asked.keys() - {"seeds"}
+    held = None
+    if stored is not None:
+        held = Extent(stored["seeds"], {name: stored[name] for name in settings})
+    return place(file.parent, held, Extent(asked["seeds"], {name: asked[name] for name in settings}))
+
+
+def finish(
+    done: Sequence[Job],
+    file: Path,
+    asked: Mapping[str, Any],
+    judged: Callable[[pa.Table, str], dict[str, Any]],
+    say: Callable[[dict[str, Any]], str] = facts,
+) -> dict[str, Any]:
+    """Gather the curves, judge, and write the verdicts; beside them `curves.parquet` and a plot.
 
     Args:
         done: jobs whose seeds are all finished, one per robot and side.
-        margin: relative.
+        file: JSON to write; the plot has its name.
+        asked: how much was measured; part of the results.
+        judged: returns the verdict on a robot from the curves.
+        say: the verdicts as a sentence of the plot's alt text.
 
     Returns:
-        What `validation.json` holds.
+        What the file holds.
     """
     import matplotlib.pyplot as plt
 
-    folder = done[0].folder
+    file.parent.mkdir(parents=True, exist_ok=True)
     table = pa.concat_tables([pq.read_table(job.curve_file(seed)) for job in done for seed in job.seeds])
-    pq.write_table(table, folder / "curves.parquet")
-    verdicts = {env: judge(table, env, margin) for env in dict.fromkeys(job.env for job in done)}
+    pq.write_table(table, file.with_name("curves.parquet"))
+    verdicts = {env: judged(table, env) for env in dict.fromkeys(job.env for job in done)}
     results = {
         "date": time.strftime("%Y-%m-%d", time.gmtime()),
         "machine": machine(),
         "versions": versions({}),
-        "seeds": {job.env: len(job.seeds) for job in done},
-        "env_steps": done[0].epochs * done[0].horizon,
-        "normalize_obs": done[0].normalize,
-        "margin": margin,
+        **asked,
         "verdicts": verdicts,
     }
-    (folder / "validation.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf8")
-    fig, alt = plot(table, verdicts)
-    fig.savefig(folder / "validation.svg", metadata={"Title": alt, "Date": None})
+    write_text(file, json.dumps(results, indent=1) + "\n")
+    fig, alt = plot(table, verdicts, say)
+    fig.savefig(file.with_suffix(".svg"), metadata={"Title": alt, "Date": None})
     plt.close(fig)
     return results
 
@@ -148,7 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--margin", type=float, default=0.15, help="relative, of equivalence (0.15)")
     parser.add_argument("--workers", type=int, default=cores(), help="processes, one thread each")
-    parser.add_argument("--output", type=Path, default=ROOT / "benchmarks" / "results" / "validation")
+    parser.add_argument("--output", type=Path, default=RESULTS / "validation")
     parser.add_argument(
         "--quick", action="store_true", help="2 seeds, 2 epochs of 256 steps; writes to …/quick"
     )
@@ -171,9 +207,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for env, count in zip(chosen.envs, counts, strict=True)
         for who in (OURS, PEER)
     ]
+    asked = about(sides) | {"normalize_obs": chosen.normalize, "margin": chosen.margin}
+    folder, why = place_beside(chosen.output / "validation.json", asked)
+    if why:
+        console.print(why, soft_wrap=True)
     if todo := jobs(sides):
         run_jobs(todo, chosen.workers, console)
-    results = finish(sides, chosen.margin)
+    results = finish(
+        sides, folder / "validation.json", asked, lambda table, env: judge(table, env, chosen.margin)
+    )
     for env, verdict in results["verdicts"].items():
         if "undecided" in verdict:
             console.print(f"{env}: undecided: {verdict['undecided']}")

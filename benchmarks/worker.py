@@ -27,6 +27,15 @@ def one_core(core: int) -> None:
     os.environ.setdefault("MUJOCO_GL", "disable")
 
 
+def own_cores(parser: argparse.ArgumentParser) -> set[int]:
+    """Return the cores that this process may use; where a process cannot be pinned to one, end the program."""
+    if not hasattr(os, "sched_getaffinity"):
+        parser.exit(
+            2, f"{parser.prog} pins everything to one core, which takes Linux (a container will do)\n"
+        )
+    return os.sched_getaffinity(0)
+
+
 def measurer(name: str, work: Any) -> Callable[[], dict[str, Any]]:
     """Return what measures one turn of a contestant, or of the floor."""
     if name == "floor":

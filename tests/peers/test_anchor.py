@@ -9,8 +9,9 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from benchmarks import anchor
+from benchmarks import anchor, validate
 from benchmarks.equivalence import seeds_needed_within
+from benchmarks.published import RESULTS
 from benchmarks.side_by_side import Job, our_config, peer_model
 from inbounds.learning import TrainConfig, Trainer
 from inbounds.learning.networks.normalizer import CLIP, EPSILON, RunningNormalizer
@@ -177,6 +178,19 @@ def test_its_numbers_are_those_of_the_protocol() -> None:
     assert chosen.seeds == 10
     assert 1_000_000 <= chosen.epochs * chosen.horizon < 1_000_000 + chosen.horizon
     assert chosen.engine == "compiled"  # the study's
+
+
+def test_one_robot_or_the_other_engine_does_not_replace_what_is_stored() -> None:
+    file = RESULTS / "anchor" / "anchor.json"
+    stored = json.loads(file.read_text())
+    same = {name: stored[name] for name in ("engine", "seeds", "env_steps")}
+    assert validate.place_beside(file, same) == (file.parent, "")
+    for change in (
+        {"seeds": {"Ant-v5": 10}},
+        {"seeds": dict.fromkeys(anchor.MARGINS, 5)},
+        {"engine": "autograd"},
+    ):
+        assert validate.place_beside(file, same | change)[0] == RESULTS / "some" / "anchor"
 
 
 @pytest.mark.slow

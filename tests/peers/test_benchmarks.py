@@ -1,7 +1,10 @@
 """The benchmark counts what it says it counts, and runs."""
 
 import json
+import os
 import re
+import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +12,11 @@ import pytest
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
-from benchmarks import anatomy, report, run
+from benchmarks import anatomy, published, report, run
 from benchmarks.contestants import CONTESTANTS, inbounds_config
 from benchmarks.floor import Floor
 from benchmarks.work import ENVS, Work, flops_per_step, multiply_adds
-from tests.made_up_speed import made_up_results, ppo_turns
+from tests.made_up_speed import made_up_results, ppo_turns, turn
 
 
 def test_the_floor_counts_the_operations_of_the_networks() -> None:
@@ -38,9 +41,9 @@ def test_the_floor_counts_the_operations_of_the_networks() -> None:
 def test_the_replay_is_the_physics_that_was_recorded() -> None:
     work = Work("Ant-v5", horizon=64)
     floor = Floor(work, num_seeds=2)
-    turn = floor.turn()
-    assert turn["seconds"] == pytest.approx(
-        turn["physics_seconds"] + turn["flops"] / turn["flops_per_second"]
+    measured = floor.turn()
+    assert measured["seconds"] == pytest.approx(
+        measured["physics_seconds"] + measured["flops"] / measured["flops_per_second"]
     )
     batch, task = floor._batch, floor._task
     batch.state[:] = floor.states[10]
@@ -73,8 +76,8 @@ def test_the_report_leads_with_ratios_and_hides_nothing() -> None:
     assert "1.50 GB" in text
     assert "sbx-ppo (No module named 'sbx')" in text
     slow = humanoid_results()
-    for turn in slow["measurements"]["Humanoid-v5"]["inbounds-ppo-10"]:
-        turn["seconds"] *= 10
+    for each in slow["measurements"]["Humanoid-v5"]["inbounds-ppo-10"]:
+        each["seconds"] *= 10
     assert "2.8: **missed**" in report.markdown(slow)
 
 
@@ -122,10 +125,123 @@ def test_a_wrong_choice_is_explained(words: list[str], fix: str, capsys: pytest.
 
 def test_results_of_some_do_not_replace_those_of_all() -> None:
     tracked = run.parse([]).output
+    assert tracked == published.RESULTS
+    for words in (["--repeats", "1"], ["--horizon", "256"]):
+        assert run.parse(words).output == tracked / "some"
     for words in (["--envs", "Hopper-v5"], ["--contestants", "floor"]):
         assert run.parse(words).output == tracked / "some"
         assert run.parse([*words, "--quick"]).output == tracked / "quick"
         assert run.parse([*words, "--output", "elsewhere"]).output == Path("elsewhere")
+
+
+class MadeUpWorker:
+    """Measures nothing; one name is not there, another ends in the second turn on Ant, the third is stopped there."""
+
+    absent = dying = stopped = ""
+
+    def __init__(self, name: str, work: Work, core: int, python: str) -> None:
+        self.name, self.env, self.turns = name, work.env, 0
+
+    def ready(self) -> str | None:
+        return "No module named 'made_up'" if self.name == self.absent else None
+
+    def turn(self) -> dict:
+        self.turns += 1
+        if self.env == "Ant-v5" and self.name == self.stopped:
+            raise KeyboardInterrupt
+        if self.env == "Ant-v5" and self.turns == 2 and self.name == self.dying:
+            return {"unavailable": "Killed"}
+        return turn(2048, self.turns)  # not all the same, or the plot has no extent
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def results_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that stands for the tracked one, with its table."""
+    folder = tmp_path / "results"
+    folder.mkdir()
+    shutil.copy(published.RESULTS / "speed.json", folder)
+    monkeypatch.setattr(published, "RESULTS", folder)
+    monkeypatch.setattr(run, "Worker", MadeUpWorker)
+    monkeypatch.setattr(run, "versions", lambda _: {})
+    return folder
+
+
+def speed_in(folder: Path) -> dict:
+    found: dict = json.loads((folder / "speed.json").read_text(encoding="utf8"))
+    return found
+
+
+def test_a_run_of_all_replaces_the_table(results_folder: Path, capsys: pytest.CaptureFixture) -> None:
+    run.main(["--output", str(results_folder)])
+    assert speed_in(results_folder)["versions"] == {}
+    assert "Results go to" not in capsys.readouterr().out
+    assert list(speed_in(results_folder / "some")["measurements"]) == list(ENVS[:3])  # after the third robot
+
+
+def test_a_run_without_a_contestant_of_the_table_leaves_it(
+    results_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(MadeUpWorker, "absent", "rltools-ppo")
+    before = speed_in(results_folder)
+    run.main(["--output", str(results_folder)])
+    assert speed_in(results_folder) == before
+    assert set(speed_in(results_folder / "some")["unavailable"]) == {"rltools-ppo"}
+    said = " ".join(capsys.readouterr().out.split())
+    assert "rltools-ppo does not take part: No module named 'made_up'" in said
+    assert f"rltools-ppo did not take part. {run.HOW_TO_ADD}" in said
+    assert not (results_folder / "speed.md").exists()
+
+
+def test_what_ends_between_two_turns_is_absent_from_there_on(
+    results_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MadeUpWorker, "dying", "sb3-ppo")
+    run.main(["--output", str(results_folder)])
+    found = speed_in(results_folder / "some")
+    assert [env for env, turns in found["measurements"].items() if "sb3-ppo" in turns] == list(ENVS[:2])
+    assert found["unavailable"] == {"sb3-ppo": "it ended on Ant-v5: Killed"}
+    assert "sb3-ppo (it ended on Ant-v5: Killed)" in report.markdown(found)
+
+
+def test_an_interrupted_run_keeps_its_robots(results_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MadeUpWorker, "stopped", "floor")
+    before = speed_in(results_folder)
+    with pytest.raises(KeyboardInterrupt):
+        run.main(["--output", str(results_folder)])
+    assert speed_in(results_folder) == before
+    assert list(speed_in(results_folder / "some")["measurements"]) == list(ENVS[:2])
+
+
+@pytest.mark.parametrize("last_words", ["", "print('{', end='')", "raise MemoryError('too little')"])
+def test_a_process_that_ends_after_its_warm_up_says_why(
+    last_words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = f"print('{{\"ready\": true}}', flush=True)\n{last_words}"
+    start = run.subprocess.Popen
+    monkeypatch.setattr(run.subprocess, "Popen", lambda _, **how: start([sys.executable, "-c", code], **how))
+    worker = run.Worker("floor", Work("Hopper-v5"), 0, sys.executable)
+    assert worker.ready() is None
+    worker._process.wait()  # or it might still read
+    why = worker.turn()["unavailable"]
+    assert why == ("MemoryError: too little" if "Memory" in last_words else "it ended in silence")
+    worker.close()
+
+
+def test_the_anatomy_says_what_it_takes_where_nothing_can_be_pinned(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """As on macOS."""
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for words, code in ((["--help"], 0), ([], 2)):
+        with pytest.raises(SystemExit) as ended:
+            anatomy.main(words)
+        assert ended.value.code == code
+    assert "takes Linux" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        run.parse([])
+    assert "benchmarks.run pins everything" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -137,7 +253,7 @@ def test_a_quick_run_measures_and_writes(tmp_path, capsys: pytest.CaptureFixture
     assert set(names) - set(results["unavailable"]) == set(measured)
     assert set(results["unavailable"]) <= {"sbx-ppo", "rltools-ppo"}
     assert measured["inbounds-ppo-10"][0]["steps"] == 2560
-    assert all(turn["peak_bytes"] > 1e8 for turns in measured.values() for turn in turns)
+    assert all(each["peak_bytes"] > 1e8 for turns in measured.values() for each in turns)
     assert "## Ratios" in (tmp_path / "quick" / "speed.md").read_text()
     assert (tmp_path / "quick" / "speed.svg").stat().st_size > 1000
     assert "Ratios" in capsys.readouterr().out

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import engines
+from benchmarks import engines, published
 
 
 def test_a_small_comparison_judges_and_goes_on_where_it_was(
@@ -33,6 +33,32 @@ def test_a_small_comparison_judges_and_goes_on_where_it_was(
     monkeypatch.setattr(engines, "train_side", lambda *_: pytest.fail("everything is there"))
     engines.main(words)
     assert capsys.readouterr().out == said
+
+
+def test_a_small_comparison_does_not_replace_what_is_stored(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the command that the help gives as a small one, and by the default; nothing is trained."""
+    monkeypatch.setattr(published, "RESULTS", tmp_path)
+    monkeypatch.setattr(engines, "train_side", lambda *_: None)
+    monkeypatch.setattr(engines, "judge", lambda *_: {"undecided": "made up"})
+    folder = tmp_path / "engines" / "ppo-logit-normal"
+    folder.mkdir(parents=True)
+    stored = (engines.RESULTS / "engines" / folder.name / "engines.json").read_text()
+    (folder / "engines.json").write_text(stored)
+    output = ["--output", str(tmp_path / "engines")]
+    for words in (["--envs", "Swimmer-v5", "--epochs", "30"], [], ["--margin", "0.2", "--seeds", "40"]):
+        engines.main([*words, *output])
+        assert (folder / "engines.json").read_text() == stored
+        aside = tmp_path / "some" / "engines" / folder.name / "engines.json"
+        assert "made up" in aside.read_text()
+        aside.unlink()
+        assert "Results go to" in capsys.readouterr().out
+    engines.main(["--envs", "Hopper-v5", "--seeds", "40", *output])  # as the notebook says
+    assert (
+        json.loads((folder / "engines.json").read_text())["verdicts"]["Hopper-v5"]["undecided"] == "made up"
+    )
+    assert "Results go to" not in capsys.readouterr().out
 
 
 def test_a_verdict_is_the_equivalence_of_the_areas() -> None:

@@ -3,11 +3,13 @@
 import json
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from scipy import stats
 
 from benchmarks import validate
 from benchmarks.equivalence import area, equivalence, seeds_needed
+from benchmarks.published import RESULTS
 
 
 def test_against_a_peer_without_noise_it_is_two_one_sample_tests() -> None:
@@ -56,7 +58,36 @@ def test_it_says_when_there_is_nothing_to_compare_with() -> None:
 
 def test_epochs_without_an_episode_do_not_count_as_bad_ones() -> None:
     nan = np.nan
-    assert area([[nan, 2.0, nan, nan, 6.0], [1.0, 1.0, 1.0, 1.0, 1.0]]).tolist() == [3.0, 1.0]
+    assert area([[nan, 2.0, nan, nan, 6.0], [1.0, 1.0, 1.0, 1.0, 1.0]]).tolist() == [14 / 5, 1.0]
+
+
+def test_the_stored_areas_come_out_of_the_stored_curves() -> None:
+    folder = RESULTS / "validation"
+    stored = json.loads((folder / "validation.json").read_text(encoding="utf8"))
+    table = pq.read_table(folder / "curves.parquet")
+    for env, verdict in stored["verdicts"].items():
+        for who in (validate.OURS, validate.PEER):
+            assert area(validate.curves(table, env, who)).tolist() == verdict[who]["areas"]
+
+
+def test_fewer_seeds_or_other_settings_do_not_replace_what_is_stored() -> None:
+    folder = RESULTS / "validation"
+    file = folder / "validation.json"
+    stored = json.loads(file.read_text(encoding="utf8"))
+    same = {name: stored[name] for name in ("seeds", "env_steps", "normalize_obs", "margin")}
+    more = {env: 2 * seeds for env, seeds in stored["seeds"].items()}
+    for asked in (same, same | {"seeds": more | {"Ant-v5": 2}}):
+        assert validate.place_beside(file, asked) == (folder, "")
+    one = dict(list(stored["seeds"].items())[:1])
+    for change, why in (
+        ({"seeds": one}, "HalfCheetah-v5: 0 instead of"),
+        ({"env_steps": 61440}, "env_steps: 61440 instead of"),
+        ({"normalize_obs": True}, "normalize_obs: True instead of False"),
+        ({"margin": 0.1}, "margin: 0.1 instead of 0.15"),
+    ):
+        target, said = validate.place_beside(file, same | change)
+        assert target == RESULTS / "some" / "validation"
+        assert why in said
 
 
 def test_a_curve_that_ends_without_a_return_has_no_area() -> None:
