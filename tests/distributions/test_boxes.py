@@ -1,6 +1,7 @@
 """What is no box for a bounded law is refused, and the remedy that the message names is one."""
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -8,26 +9,29 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from inbounds.distributions import LogitNormal
 from inbounds.distributions.bounds import require_bounds
 from inbounds.distributions.boxes import require_box
+from inbounds.learning import Trainer
+from tests.learning.small import small_config
 
 
 class Heard(gymnasium.Env):
-    """It keeps the last action, which must be one of its own."""
+    """Every action must be one of its own."""
 
-    observation_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
-
-    def __init__(self, action_space: spaces.Space) -> None:
+    def __init__(self, action_space: spaces.Space, observation_space: spaces.Space | None = None) -> None:
         self.action_space = action_space
+        self.observation_space = observation_space or spaces.Box(-1.0, 1.0, (1,), np.float32)
 
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict]:
-        return np.zeros(1, np.float32), {}
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, dict]:
+        self.observation_space.seed(0)
+        return self.observation_space.sample(), {}
 
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict]:
         assert self.action_space.contains(action), action
-        return np.zeros(1, np.float32), 0.0, False, False, {}
+        return self.observation_space.sample(), 0.0, False, False, {}
 
 
 WIDE, UNIT = spaces.Box(-3.0, 3.0, (2,), np.float32), spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -100,11 +104,17 @@ def test_every_name_of_gymnasium_in_the_source_exists() -> None:
     ids=["discrete", "dict"],
 )
 def test_the_remedy_for_observations_works(space: spaces.Space, flat: int) -> None:
-    env = Heard(UNIT)
-    env.observation_space = space
-    found = gymnasium.wrappers.FlattenObservation(env).observation_space
-    assert isinstance(found, spaces.Box)
-    assert found.shape == (flat,)
+    def vector(wrap: Callable[[gymnasium.Env], gymnasium.Env]) -> Callable[[int], SyncVectorEnv]:
+        makers = [lambda: wrap(Heard(UNIT, space))]
+        return lambda n: SyncVectorEnv(makers * n, autoreset_mode=AutoresetMode.SAME_STEP)
+
+    config = small_config(seeds=2, horizon=32)
+    with pytest.raises(ValueError, match=r"gymnasium\.wrappers\.FlattenObservation"):
+        Trainer(config, vector(lambda env: env))
+    trainer = Trainer(config, vector(gymnasium.wrappers.FlattenObservation))
+    trainer.epoch()
+    assert trainer.rollout is not None
+    assert trainer.rollout.obs.shape == (2, 32, flat)
 
 
 def test_bounds_are_kept_apart_from_the_callers_memory() -> None:

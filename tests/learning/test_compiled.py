@@ -13,11 +13,11 @@ import torch
 
 from inbounds.learning import DivergedSeedWarning, PPOConfig, TrainConfig, Trainer, ppo, train
 from inbounds.learning.families.policy import FAMILIES as ALL_FAMILIES
-from inbounds.learning.networks import kernels
+from inbounds.learning.networks import compiled_acting, compiling, kernels
 from inbounds.learning.networks.adam import SeedAdam
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.training import prepare
-from inbounds.learning.updates.compiled import CompiledAdam
+from inbounds.learning.updates.compiled import CompiledAdam, ppo_passes_of, value_passes
 from inbounds.learning.updates.engine import compiled_engine
 from inbounds.learning.updates.value import fit_values
 from tests.learning.made_up import SHAPES, made_up_networks, made_up_rollout
@@ -237,8 +237,23 @@ def test_every_matrix_library_has_one_thread() -> None:
         assert {one["num_threads"] for one in libraries} == {1}
 
 
-def test_preparing_compiles_what_a_run_calls() -> None:
-    config = compiled(small_config())
-    assert prepare(config, PointEnv) > 0
-    assert prepare(config, PointEnv) < 0.5
-    assert prepare(small_config(), PointEnv) < 0.01
+@pytest.mark.parametrize("algo", ["ppo", "trpo"])
+def test_preparing_compiles_what_a_run_calls(algo: str) -> None:
+    for made in (compiled_acting._outputs, compiled_acting._see, ppo_passes_of, value_passes):
+        made.cache_clear()
+    functions = compiling._refuse_to_compile().functions
+    before, config = len(functions), compiled(small_config(algo))
+
+    def known() -> list[Any]:
+        return [function.signatures for function in functions[before:]]
+
+    prepare(config, PointEnv)
+    prepared = known()
+    assert len(prepared) == 3  # outputs, statistics and a pass
+    assert all(prepared)
+    small_run(config)
+    assert known() == prepared
+
+
+def test_for_autograd_there_is_nothing_to_prepare() -> None:
+    prepare(small_config(), lambda _: pytest.fail("it makes environments"))

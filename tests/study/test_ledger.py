@@ -54,6 +54,12 @@ def made_up(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
 
 
 @pytest.fixture(scope="module")
+def judged(made_up: Outcomes) -> dict[str, Finding]:
+    """What the whole study says, by claim."""
+    return {claim.id: judge(made_up, claim) for claim in FROM_CELLS}
+
+
+@pytest.fixture(scope="module")
 def few(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
     """PPO's cells of two arms, and one mechanism on Hopper: seconds less than the whole study."""
     folder = folder_in(tmp_path_factory.mktemp("few"))
@@ -359,15 +365,13 @@ def test_numbers_do_not_depend_on_the_order_in_which_they_are_asked_for(shipped:
 
 
 @pytest.mark.slow
-def test_a_whole_study_leaves_nothing_missing(made_up: Outcomes) -> None:
-    verdicts = {}
-    for claim in FROM_CELLS:
-        found = judge(made_up, claim)
-        assert found.finished == found.planned > 0, claim.id
-        assert all(statement.state != "missing" for statement in found.statements), claim.id
+def test_a_whole_study_leaves_nothing_missing(judged: dict[str, Finding]) -> None:
+    for name, found in judged.items():
+        assert found.finished == found.planned > 0, name
+        assert all(statement.state != "missing" for statement in found.statements), name
         assert all(statement.estimate is not None for statement in found.statements)
-        assert found.verdict != "undecided" or found.outlook == "stays undecided", claim.id
-        verdicts[claim.id] = found.verdict
+        assert found.verdict != "undecided" or found.outlook == "stays undecided", name
+    verdicts = {name: found.verdict for name, found in judged.items()}
     # What the made-up levels say: Beta above Gaussian by 250, logit-normal above Beta by 250, everywhere.
     assert (
         verdicts["wins-ppo-printed"]
@@ -401,13 +405,15 @@ def test_a_statement_names_the_cells_it_needs(made_up: Outcomes) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_whole_study_decides_within_what_a_part_of_it_leaves_open(made_up: Outcomes, seed: int) -> None:
+def test_the_whole_study_decides_within_what_a_part_of_it_leaves_open(
+    made_up: Outcomes, judged: dict[str, Finding], seed: int
+) -> None:
     """Without some of the cells a claim says what is out of reach; with all of them it keeps its word."""
     rng = np.random.default_rng(seed)
     kept = {name: cell for name, cell in made_up.finished.items() if rng.random() < 0.6}
     part = Outcomes(kept, made_up.states, made_up.folder)
     for claim in FROM_CELLS:
-        before, after = judge(part, claim), judge(made_up, claim).verdict
+        before, after = judge(part, claim), judged[claim.id].verdict
         if before.verdict != "undecided":
             assert after == before.verdict, claim.id
         else:
@@ -480,10 +486,10 @@ def test_a_group_in_both_gaps_is_drawn_once(few: Outcomes) -> None:
         assert width / np.sqrt(variance) == pytest.approx(2 * stats.t.ppf(0.975, 25), rel=0.12)
 
 
-def test_what_the_protocol_does_not_list_is_called_exploratory(made_up: Outcomes) -> None:
+def test_what_the_protocol_does_not_list_is_called_exploratory(judged: dict[str, Finding]) -> None:
     """Listed: differences with the protocol's test, the probability of improvement, changes on one robot."""
     for claim in FROM_CELLS:
-        statements = judge(made_up, claim).statements
+        statements = judged[claim.id].statements
         tested = all(not np.isnan(s.p_adjusted) for s in statements) and not claim.id.startswith("start")
         listed = tested or claim.id.startswith("overall") or claim.id == "swimmer-gamma"
         assert claim.standing == ("listed in the protocol" if listed else "exploratory"), claim.id

@@ -93,18 +93,18 @@ def test_a_file_cut_short_claims_nothing(tmp_path: Path, text: str) -> None:
 
 def test_of_many_exactly_one_takes_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path, pid=2**22 + 1)  # above the kernel's largest
-    start, taken, real = threading.Barrier(8), [], is_alive
+    both, taken, real = threading.Barrier(2), [], is_alive
 
     def look(holder: Mapping[str, Any]) -> bool:
-        """Look, and dawdle: whoever else looks now sees the same dead holder, unless it has to wait."""
+        """Look, and wait for another who sees the same dead holder; in vain where that one has to wait, too."""
         alive = real(holder)
-        time.sleep(0.05)
+        with contextlib.suppress(threading.BrokenBarrierError):
+            both.wait(0.5)
         return alive
 
     monkeypatch.setattr(cell_lock, "is_alive", look)
 
     def take() -> None:
-        start.wait()
         with contextlib.suppress(ClaimedError):
             taken.append(CellLock.take(tmp_path))
 

@@ -1,8 +1,9 @@
+import contextlib
+import importlib
 import json
 import re
 import shutil
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,13 @@ from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import save_policies
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study import StudyFolder, read_cell, run_cell, select, store, verify
+from inbounds.study.grid import ROBOTS, Cell
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.running import evaluate
-from inbounds.study.running.verify import TOLERANCE, Checked, check_rerun, first_mismatch
+from inbounds.study.running.provenance import provenance
+from inbounds.study.running.verify import CHEAP_FIRST, TOLERANCE, Checked, check_rerun, first_mismatch
 from tests.cli.small import run
+from tests.study import synthetic
 from tests.study.small import folder_in, small_cell
 from tests.study.synthetic import write_cells
 
@@ -90,14 +94,16 @@ def test_checksums_are_what_sha256sum_reads(folder: StudyFolder) -> None:
 
 
 def test_sums_written_at_the_same_time_are_all_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, real = folder_in(tmp_path), StudyFolder.checksums
+    folder, real, both = folder_in(tmp_path), StudyFolder.checksums, threading.Barrier(2)
 
-    def dawdle(self: StudyFolder) -> dict[str, str]:
+    def meet(self: StudyFolder) -> dict[str, str]:
+        """Read, and wait for another who reads the same list; in vain where that one has to wait, too."""
         sums = real(self)
-        time.sleep(0.05)  # whoever else reads now sees the same list, unless it has to wait
+        with contextlib.suppress(threading.BrokenBarrierError):
+            both.wait(0.5)
         return sums
 
-    monkeypatch.setattr(StudyFolder, "checksums", dawdle)
+    monkeypatch.setattr(StudyFolder, "checksums", meet)
     paths = [folder.results / "cells" / f"{i}.parquet" for i in range(6)]
     threads = [threading.Thread(target=folder.publish, args=({path: b"rows"},)) for path in paths]
     for thread in threads:
@@ -334,7 +340,11 @@ def test_wheels_decide_whether_rows_must_be_repeated(
     assert ("repeated exactly" in finding.message) is exact
 
 
-def test_on_another_machine_the_first_rewards_are_compared(folder: StudyFolder) -> None:
+def test_on_another_machine_the_first_rewards_are_compared(
+    folder: StudyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nothing is trained for that."""
+    monkeypatch.delattr(Trainer, "epoch")
     about = store.read_metadata(folder.cell_file(CELL))
     elsewhere = [about["sessions"][0] | {"processor": "abacus"}]
     republish(folder, sessions=elsewhere)
@@ -345,3 +355,24 @@ def test_on_another_machine_the_first_rewards_are_compared(folder: StudyFolder) 
     rewards[1][15] += 3 * TOLERANCE
     republish(folder, sessions=elsewhere, first_rewards=rewards)
     assert not check_rerun(CELL, folder, 1).ok
+
+
+def test_of_a_column_the_cheapest_cell_of_this_machine_runs_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    column = {cell.robot: cell for cell in select(["standard"]) if cell.id.endswith("-ppo-beta")}
+    folder, module, chosen = folder_in(tmp_path), importlib.import_module(verify.__module__), []
+
+    def note(cell: Cell, *_: Any) -> Checked:
+        chosen.append(cell.robot)
+        return Checked(cell.id, True, "")
+
+    monkeypatch.setattr(module, "check_rerun", note)
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(synthetic, "provenance", lambda: provenance() | {"processor": "abacus"})
+        write_cells(folder, [column["HalfCheetah"], column["Swimmer"]])
+    verify([*column.values()], folder)
+    write_cells(folder, [column["Ant"], column["Hopper"]])
+    verify([*column.values()], folder)
+    assert chosen == ["HalfCheetah", "Hopper"]
+    assert set(CHEAP_FIRST) == set(ROBOTS)

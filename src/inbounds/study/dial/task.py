@@ -98,7 +98,7 @@ class DialEnv(VectorEnv[Any, Any, Any]):
 
     Args:
         task: the knobs.
-        num_envs: S.
+        num_envs: how many, S.
 
     Example:
         >>> envs = DialEnv(DialTask(0.5), num_envs=2)
