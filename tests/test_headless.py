@@ -75,12 +75,6 @@ def test_osmesa_stands_in_for_egl(tmp_path):
     assert run(code, tmp_path).strip() == "osmesa"
 
 
-def test_importing_the_package_imports_nothing_heavy(tmp_path):
-    heavy = ("mujoco", "gymnasium", "torch", "IPython", "jupyter", "bokeh", "mediapy", "matplotlib")
-    code = f"import sys, inbounds; print([name for name in {heavy!r} if name in sys.modules])"
-    assert run(code, tmp_path).strip() == "[]"
-
-
 TRY_TO_DRAW = """
 import gymnasium
 from inbounds.robots import RobotRenderer

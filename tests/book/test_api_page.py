@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,8 +24,14 @@ def setup(app):
 """
 
 
-def complaints(folder: Path, page: str) -> list[str]:
-    """Return what Sphinx, set as the book sets it, cannot find on a page."""
+ALONE = "inbounds.cli.training.run"
+"""No page has it, nor the types of its signature."""
+
+
+@pytest.fixture(scope="module")
+def complaints(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """What Sphinx, set as the book sets it, cannot find on the page and on another, which shows `ALONE`."""
+    folder = tmp_path_factory.mktemp("api")
     config = yaml.safe_load((ROOT / "_config.yml").read_text(encoding="utf8"))["sphinx"]["config"]
     chosen = {
         k: v
@@ -35,18 +42,23 @@ def complaints(folder: Path, page: str) -> list[str]:
     (folder / "conf.py").write_text(
         CONF.format(ext=str(ROOT / "book" / "_ext"), settings=settings), encoding="utf8"
     )
+    page = (ROOT / "book" / "api.md").read_text(encoding="utf8")
     (folder / "index.md").write_text(page, encoding="utf8")
+    other = f"---\norphan: true\n---\n\n# Alone\n\n```{{eval-rst}}\n.. autofunction:: {ALONE}\n```\n"
+    (folder / "alone.md").write_text(other, encoding="utf8")
     command = [sys.executable, "-m", "sphinx", "-q", "-b", "dummy", str(folder), str(folder / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return [line for line in done.stderr.splitlines() if "WARNING" in line]
 
 
-def test_every_name_on_the_page_is_found(tmp_path: Path) -> None:
-    page = (ROOT / "book" / "api.md").read_text(encoding="utf8")
-    assert complaints(tmp_path, page) == []
+def of_the_other(complaint: str) -> bool:
+    return "alone.md" in complaint or f"docstring of {ALONE}" in complaint
 
 
-def test_a_name_that_no_page_has_is_told(tmp_path: Path) -> None:
-    page = "# Alone\n\n```{eval-rst}\n.. autoclass:: inbounds.learning.Trainer\n```\n"
-    assert any("reference target not found" in line for line in complaints(tmp_path, page))
+def test_every_name_on_the_page_is_found(complaints: list[str]) -> None:
+    assert [line for line in complaints if not of_the_other(line)] == []
+
+
+def test_a_name_that_no_page_has_is_told(complaints: list[str]) -> None:
+    assert any("reference target not found" in line for line in complaints if of_the_other(line))

@@ -14,12 +14,6 @@ NOTEBOOKS = ROOT / "notebooks"
 PAGE = (ROOT / "book" / "teaching.md").read_text(encoding="utf8")
 
 
-@pytest.mark.parametrize("chapter", COURSE)
-def test_a_session_has_its_planned_minutes(chapter: str) -> None:
-    plan = plan_of(NOTEBOOKS / f"{chapter}.ipynb")
-    assert (plan.minutes("short"), plan.minutes("long")) == (50, 90)
-
-
 def test_the_courses_follow_the_book() -> None:
     places = [anatomy.PAGES.core.index(chapter) for chapter in COURSE]
     assert places == sorted(places)

@@ -73,10 +73,12 @@ def test_a_file_runs_alone_with_a_robot(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MOST)
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize(("name", "policy"), [("ppo", "logit-normal"), ("ppo", "beta"), ("trpo", "gaussian")])
 def test_a_file_holds_the_pole(tmp_path: Path, name: str, policy: str) -> None:
-    """An episode has at most 1000 steps; 2048 points of a batch over two or fewer ends are 1000 at least."""
+    """An episode has at most 1000 steps; 2048 points of a batch over two or fewer ends are 1000 at least.
+
+    Each file and each law once: TRPO's chapter does it with the other two, and the updates are the package's below.
+    """
     epochs = "30" if name == "ppo" else "60"
     scores = alone(tmp_path, name, "--policy", policy, "--epochs", epochs)
     assert 2 < next(scores) < 30

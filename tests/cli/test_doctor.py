@@ -129,7 +129,6 @@ def test_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "✗ disk: 1.0 GB free here free 3.0 GB, or work in another folder" in out
 
 
-@pytest.mark.slow
 def test_opengl_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     said = SimpleNamespace(returncode=1, stderr="ImportError: no EGL here")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: said)

@@ -3,13 +3,16 @@
 import os
 import subprocess
 import sys
+import traceback
+from collections.abc import Iterator
 from pathlib import Path
 
+import gymnasium
 import pytest
 
 from inbounds.cli import main
 from inbounds.learning.storage.run_store import load_checkpoint
-from tests.cli.small import SMALL
+from tests.cli.small import SMALL, run
 
 MODULE = '''
 import os
@@ -64,10 +67,16 @@ gymnasium.register("OwnHopper-v0", HopperEnv, max_episode_steps=50)
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where the module is, and this process too: what it imports and registers there goes with the test."""
     (tmp_path / "my arms.py").write_text("")
     (tmp_path / "my_arm.py").write_text(MODULE)
-    return tmp_path
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    yield tmp_path
+    sys.modules.pop("my_arm", None)
+    for name in [each for each in gymnasium.registry if each.startswith(("Target", "OwnHopper"))]:
+        del gymnasium.registry[name]
 
 
 def inbounds(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -80,23 +89,24 @@ def inbounds(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def train(env: str, folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    return inbounds("train", f"my_arm:{env}", *SMALL, "--epochs", "2", "--out", "my run", *more, cwd=folder)
+def training(env: str, *more: str) -> list[str]:
+    return ["train", f"my_arm:{env}", *SMALL, "--epochs", "2", "--out", "my run", *more]
 
 
 @pytest.mark.slow
 def test_a_module_is_found_in_its_own_folder_and_its_run_is_watched_on_request_only(folder: Path) -> None:
-    done = train("OwnHopper-v0", folder)
+    done = inbounds(*training("OwnHopper-v0"), cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "film it: inbounds watch 'my run' --trust" in done.stdout
 
     words = ("watch", "my run", "--seconds", "0.1", "--width", "64", "--height", "48")
-    refused = inbounds(*words, cwd=folder)
-    assert refused.returncode == 1
-    assert "IMPORTED" not in refused.stdout
-    assert "Python imports the module my_arm" in refused.stderr
-    assert "inbounds watch 'my run' --trust" in refused.stderr
-    assert refused.stderr.count("\n") == 1
+    code, out, err = run(*words)
+    assert code == 1
+    assert "IMPORTED" not in out
+    assert "my_arm" not in sys.modules
+    assert "Python imports the module my_arm" in err
+    assert "inbounds watch 'my run' --trust" in err
+    assert err.count("\n") == 1
 
     watched = inbounds(*words, "--trust", cwd=folder)
     assert (watched.returncode, watched.stderr) == (0, "")
@@ -104,59 +114,65 @@ def test_a_module_is_found_in_its_own_folder_and_its_run_is_watched_on_request_o
     assert (folder / "my run" / "median-seed0.mp4").stat().st_size > 0
 
     (folder / "my_arm.py").unlink()
-    lost = inbounds(*words, "--trust", cwd=folder)
-    assert lost.returncode == 1
-    assert "my_arm:OwnHopper-v0 cannot be made here: No module named 'my_arm'" in lost.stderr
-    assert lost.stderr.count("\n") == 1
+    code, _, err = run(*words, "--trust")
+    assert code == 1
+    assert "my_arm:OwnHopper-v0 cannot be made here: No module named 'my_arm'" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "said"),
+    [
+        ("reset", ValueError, "the arm is not homed"),
+        ("step", ValueError, "the arm is stuck"),
+        ("file", FileNotFoundError, r"No such file or directory: 'no/such/calibration'"),
+    ],
+)
+@pytest.mark.usefixtures("folder")
+def test_what_an_environment_raises_keeps_its_place(fault: str, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said) as raised:
+        run(*training(f"Target{fault}-v0"))
+    assert Path(traceback.extract_tb(raised.tb)[-1].filename).name == "my_arm.py"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        ("reset", "ValueError: the arm is not homed"),
-        ("step", "ValueError: the arm is stuck"),
-        ("file", "FileNotFoundError: [Errno 2] No such file or directory: 'no/such/calibration'"),
-        ("pipe", "BrokenPipeError: the simulator has gone"),
-    ],
-)
-def test_what_an_environment_raises_is_told_with_its_place(fault: str, said: str, folder: Path) -> None:
-    done = train(f"Target{fault}-v0", folder)
+def test_an_environments_broken_pipe_is_told_with_its_place(folder: Path) -> None:
+    """And is not taken for output that nobody reads."""
+    done = inbounds(*training("Targetpipe-v0"), cwd=folder)
     assert done.returncode == 1
-    assert said in done.stderr
+    assert "BrokenPipeError: the simulator has gone" in done.stderr
     assert 'my_arm.py", line' in done.stderr
 
 
-@pytest.mark.slow
 def test_a_run_stays_where_it_was_asked_for(folder: Path) -> None:
     """Whatever directory the environment goes to, at its resets even."""
-    done = train("Targetaway-v0", folder)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "my run has curves.parquet" in done.stdout
+    code, out, err = run(*training("Targetaway-v0"))
+    assert (code, err) == (0, "")
+    assert "my run has curves.parquet" in out
     assert len(load_checkpoint(folder / "my run")["records"]) == 2
     assert not list((folder / "away").rglob("checkpoint.pt"))
 
 
 @pytest.mark.slow
 def test_an_environment_that_ends_the_process_is_told_from_a_call_for_help(folder: Path) -> None:
-    done = train("Targetexit-v0", folder)
+    done = inbounds(*training("Targetexit-v0"), cwd=folder)
     assert done.returncode == 1
     assert done.stderr == "inbounds: the environment ended the process: sys.exit(0)\n"
     assert "examples" not in done.stdout
-    late = train("Targetlate-v0", folder, "--epochs", "4")
-    assert late.returncode == 1
-    assert late.stderr == "inbounds: the environment ended the process: sys.exit('no licence')\n"
-    assert "stopped by an error. 'my run' keeps 2 epochs" in late.stdout
+    code, out, err = run(*training("Targetlate-v0", "--epochs", "4"))
+    assert code == 1
+    assert err == "inbounds: the environment ended the process: sys.exit('no licence')\n"
+    assert "stopped by an error. 'my run' keeps 2 epochs" in out
 
 
-@pytest.mark.slow
-def test_a_run_that_goes_on_tells_what_its_environment_cannot(folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_run_that_goes_on_tells_what_its_environment_cannot() -> None:
     told = (
         "going on with my run, 2 epochs done; my_arm:Target-v0 cannot save its state, so new episodes begin"
     )
-    train("Target-v0", folder)
-    assert "new episodes" not in train("Target-v0", folder).stdout  # there is nothing to do
-    assert told in train("Target-v0", folder, "--epochs", "3").stdout
+    assert run(*training("Target-v0"))[0] == 0
+    assert "new episodes" not in run(*training("Target-v0"))[1]  # there is nothing to do
+    assert told in run(*training("Target-v0", "--epochs", "3"))[1]
 
 
 @pytest.mark.parametrize("env", [":", ":Env-v0", "my_arm:", "my_arm::Env-v0"])
@@ -165,19 +181,18 @@ def test_half_an_environment_is_refused(env: str, capsys: pytest.CaptureFixture[
     assert f"{env!r} is no environment: give an id, or module:id. The tasks are" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("fault", ["nan", "infinite"])
-def test_observations_and_rewards_that_are_no_numbers_are_no_matter_of_the_learning_rate(
-    fault: str, folder: Path
-) -> None:
-    done = train(f"Target{fault}-v0", folder)
-    assert done.returncode == 1
-    assert done.stdout.count("warning: ") == 1
-    assert "warning: seeds [0, 1] diverged in epoch" in done.stdout
-    assert "What helps: mend the environment, which has returned an observation" in done.stderr
-    assert "learning" not in done.stderr + done.stdout
-    again = train(f"Target{fault}-v0", folder)  # whose process has not seen why
-    assert "smaller --algorithm.learning-rate" in again.stderr
-    assert "that is NaN, mend the environment" in again.stderr
+def test_observations_and_rewards_that_are_no_numbers_are_no_matter_of_the_learning_rate(fault: str) -> None:
+    code, out, err = run(*training(f"Target{fault}-v0"))
+    assert code == 1
+    assert out.count("warning: ") == 1
+    assert "warning: seeds [0, 1] diverged in epoch" in out
+    assert "What helps: mend the environment, which has returned an observation" in err
+    assert "learning" not in err + out
+    _, _, again = run(*training(f"Target{fault}-v0"))  # which has not seen why
+    assert "smaller --algorithm.learning-rate" in again
+    assert "that is NaN, mend the environment" in again
 
 
 @pytest.mark.slow
@@ -216,6 +231,7 @@ def test_training_that_nobody_reads_says_that_it_stops_and_keeps_everything(tmp_
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
 @pytest.mark.parametrize(
     "words", [["--help"], ["--version"], ["study", "status", "--each"], ["study", "ledger"]]

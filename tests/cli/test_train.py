@@ -1,12 +1,16 @@
+import contextlib
 import dataclasses
 import errno
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -71,13 +75,15 @@ def test_what_is_kept_is_told_when_nobody_can_be_told(every: str, tmp_path: Path
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_a_terminal_without_our_letters_ends_no_run(encoding: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "inbounds", *small(tmp_path / "run", 2)]
-    done = subprocess.run(
-        command, env=os.environ | {"PYTHONIOENCODING": encoding}, capture_output=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert b"done: 2 epochs" in done.stdout
+def test_a_terminal_without_our_letters_ends_no_run(
+    encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = {name: io.BytesIO() for name in ("stdout", "stderr")}
+    for name, to in written.items():
+        monkeypatch.setattr(sys, name, io.TextIOWrapper(to, encoding, write_through=True))
+    code = main(small(tmp_path / "run", 2))
+    assert (code, written["stderr"].getvalue()) == (0, b"")
+    assert b"done: 2 epochs" in written["stdout"].getvalue()
 
 
 def test_without_an_output_it_trains(tmp_path: Path) -> None:
@@ -196,21 +202,43 @@ def test_when_all_seeds_diverge(tmp_path: Path) -> None:
 HEARING = """
 import signal, sys
 from inbounds.cli import main
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which a process under nohup ignores
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a process in the background ignores
 sys.exit(main())
 """
 
 
-@pytest.mark.parametrize(
-    "number",
-    [
-        signal.SIGKILL,
-        *(
-            pytest.param(each, marks=pytest.mark.slow)
-            for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        ),
-    ],
-)
+@contextlib.contextmanager
+def handled(number: signal.Signals, by: Any) -> Iterator[None]:
+    """A signal by a handler, whatever this process was started with."""
+    before = signal.signal(number, by)
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_job_s_end_and_a_closed_terminal_stop_a_run_after_its_epoch(
+    number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tell = TrainingProgress.__call__
+
+    def signalled(self: TrainingProgress, trainer: Trainer, record: dict) -> None:
+        tell(self, trainer, record)
+        if len(trainer.records) == 2:
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(TrainingProgress, "__call__", signalled)
+    with handled(number, signal.default_int_handler):  # a signal that is not taken is heard all the same
+        code, _, err = run(*small(tmp_path / "run", 10, "Hopper-v5", "--checkpoint-every", "100000"))
+        assert signal.getsignal(number) is signal.default_int_handler
+    assert code == 128 + number
+    assert f"stopped. {tmp_path / 'run'} keeps 2 epochs; the same command goes on" in err
+    assert len(load_checkpoint(tmp_path / "run")["records"]) == 2
+    assert len(read_curves(tmp_path / "run")) == 2 * 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(
     number: signal.Signals, tmp_path: Path
 ) -> None:
@@ -254,8 +282,6 @@ def test_ctrl_c_twice_ends_at_once_and_says_what_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     step, steps = checkpoint.save, []
-    # As at a terminal: a shell may ignore Ctrl-C for what it starts in the background.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def impatient(path: Path, state: dict) -> None:
         steps.append(path)
@@ -265,11 +291,13 @@ def test_ctrl_c_twice_ends_at_once_and_says_what_is_kept(
         step(path, state)
 
     monkeypatch.setattr(checkpoint, "save", impatient)
-    code, _, err = run(*small(tmp_path / "run", 10))
+    # As at a terminal: a shell may ignore Ctrl-C for what it starts in the background.
+    with handled(signal.SIGINT, signal.default_int_handler):
+        code, _, err = run(*small(tmp_path / "run", 10))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert code == 130
     assert f"stopped in mid-epoch. {tmp_path / 'run'} keeps 2 epochs" in err
     assert len(load_checkpoint(tmp_path / "run")["records"]) == 2
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_under_nohup_a_closed_terminal_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -280,12 +308,9 @@ def test_under_nohup_a_closed_terminal_stops_nothing(tmp_path: Path, monkeypatch
         step(path, state)
 
     monkeypatch.setattr(checkpoint, "save", hung_up)
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
+    with handled(signal.SIGHUP, signal.SIG_IGN):
         succeeds(small(tmp_path / "run", 3))
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
     assert len(load_checkpoint(tmp_path / "run")["records"]) == 3
 
 

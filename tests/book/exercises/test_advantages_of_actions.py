@@ -32,13 +32,8 @@ def recursion(reward, next_value, terminated, truncated, gamma, lam, *, cut=True
     return returns
 
 
-@pytest.mark.parametrize("right", [by_gae, recursion])
-def test_right_answers_pass(right: Callable) -> None:
-    assert graders.lambda_returns(right).passed is True
-
-
-def test_unanswered_exercises_are_no_failures() -> None:
-    assert graders.lambda_returns(lambda *_: ...).passed is None
+def test_the_recursion_passes() -> None:
+    assert graders.lambda_returns(recursion).passed is True
 
 
 def printed(reward, next_value, terminated, truncated, gamma, lam):

@@ -69,16 +69,6 @@ def printed(loc, scale, old_loc, old_scale, latent, advantage):
     return np.mean(ratio * advantage)
 
 
-def test_right_answers_pass() -> None:
-    assert graders.effective_sample_size(stable).passed is True
-    assert graders.surrogate_of(right).passed is True
-
-
-def test_unanswered_exercises_are_no_failures() -> None:
-    assert graders.effective_sample_size(lambda *_: ...).passed is None
-    assert graders.surrogate_of(lambda *_: ...).passed is None
-
-
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -133,7 +123,6 @@ def test_mistakes_of_the_growing_program(wrong: Callable, words: str) -> None:
 
 def test_the_growing_program_s_surrogate_passes() -> None:
     assert graders.surrogate(growing).passed is True
-    assert graders.surrogate(lambda *_: ...).passed is None
 
 
 def test_a_clipped_surrogate_is_told_from_this_one() -> None:
