@@ -12,7 +12,11 @@ from scipy import integrate, stats
 from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.distributions import kl_divergence
 
-from inbounds.integrations.stable_baselines3 import LogitNormalDistribution, LogitNormalPolicy
+from inbounds.integrations.stable_baselines3 import (
+    LogitNormalActor,
+    LogitNormalDistribution,
+    LogitNormalPolicy,
+)
 from tests.integrations.tank import HIGH, LOW, BehindSigmoid, Tank
 
 SMALL = {"device": "cpu", "seed": 3, "n_steps": 128}
@@ -212,3 +216,22 @@ def test_numbers_of_any_kind_are_mapped_and_actions_have_the_boxs_type() -> None
     assert np.allclose(actions, 0.3 * np.tanh(latents / 2))
     assert np.allclose(model.policy.scale_action(actions), latents)
     assert np.array_equal(model.policy.scale_action(np.zeros(2, int)), np.zeros(2))
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_what_is_deployed_does_what_the_model_does(shared: bool) -> None:
+    options = {"share_features_extractor": shared}
+    model = PPO(LogitNormalPolicy, Tank(), policy_kwargs=options, **SMALL).learn(128)
+    obs = np.random.default_rng(0).normal(size=(50, *Tank().observation_space.shape)).astype(np.float32)
+    given = torch.from_numpy(obs)
+    deployed = torch.export.export(LogitNormalActor(model.policy), (given,)).module()
+    expected, _ = model.predict(obs, deterministic=True)
+    np.testing.assert_array_equal(deployed(given).detach().numpy(), expected)
+    assert ((expected > LOW) & (expected < HIGH)).all()
+    latents = model.policy(given, deterministic=True)[0]  # the trap: no actions
+    assert not np.allclose(latents.detach().numpy(), expected)
+
+
+def test_another_policy_is_not_deployed() -> None:
+    with pytest.raises(ValueError, match=r"takes a LogitNormalPolicy, as model\.policy"):
+        LogitNormalActor(PPO("MlpPolicy", Tank(), **SMALL).policy)

@@ -1,10 +1,11 @@
 """The book's laws in libraries that train policies themselves: one module per library, imported by name.
 
-| Library           | Module                                    | What it gives                                      |
-|-------------------|-------------------------------------------|----------------------------------------------------|
-| stable-baselines3 | `inbounds.integrations.stable_baselines3` | `LogitNormalPolicy`, `quiet_start`: PPO, A2C, TRPO   |
-| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, `quiet_actor`: logit-normal, Beta   |
-| either, or none   | `inbounds.integrations.quiet`             | `quiet_scale`, the σ of a start with little noise    |
+| Library           | Module                                    | What it gives                                       |
+|-------------------|-------------------------------------------|-----------------------------------------------------|
+| stable-baselines3 | `inbounds.integrations.stable_baselines3` | `LogitNormalPolicy`, `quiet_start`: PPO, A2C, TRPO; |
+|                   |                                           | `LogitNormalActor`: the trained policy, to deploy   |
+| TorchRL           | `inbounds.integrations.torchrl`           | `bounded_actor`, `quiet_actor`: logit-normal, Beta  |
+| either, or none   | `inbounds.integrations.quiet`             | `quiet_scale`, the σ of a start with little noise   |
 
 Both keep the rule of the book: the library stores, and scores, the *latent*; the action is made from it on the way
 into the environment. Neither library is needed by the rest of the package: `pip install ".[integrations]"`

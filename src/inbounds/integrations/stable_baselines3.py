@@ -18,7 +18,7 @@ import gymnasium
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from inbounds.distributions import ClippedNormal, LogitNormal
 from inbounds.distributions.bounds import require_bounds
@@ -34,7 +34,7 @@ except ImportError as error:
         'stable-baselines3 is not installed: pip install ".[integrations]" in the source tree'
     ) from error
 
-__all__ = ["LogitNormalDistribution", "LogitNormalPolicy", "quiet_start"]
+__all__ = ["LogitNormalActor", "LogitNormalDistribution", "LogitNormalPolicy", "quiet_start"]
 
 
 class LogitNormalDistribution(DiagGaussianDistribution):
@@ -110,10 +110,12 @@ class LogitNormalPolicy(ActorCriticPolicy):
         **options: as the peer's; `log_std_init` is the log σ of the *latent*: 0 executes a standard deviation of
             0.42 of half the range. Generalised state-dependent exploration (`use_sde`) is not for it.
 
-    The entropy, which the peer asks for in every minibatch, is an integral: training takes longer than `MlpPolicy`'s.
-
     Raises:
         ValueError: another action space (the message names the wrapper that makes this one of it), or `use_sde`.
+
+    `predict(obs, deterministic=True)` acts by the median. Called as a module, the policy returns *latents*: to deploy
+    it without the peer, export `LogitNormalActor` of it. Pass the class to the peer, not its name. The entropy, which
+    the peer asks for in every minibatch, is an integral: training takes longer than `MlpPolicy`'s.
 
     Example:
         >>> import gymnasium
@@ -175,6 +177,54 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
         box: Any = self.action_space
         return box.low, box.high
+
+
+class LogitNormalActor(nn.Module):
+    """What a `LogitNormalPolicy` does on a robot: observations `[B, O]` to the medians `[B, A]` of its actions.
+
+    A module for `torch.export`, without the peer, its critic and its noise; called itself, the policy returns latents.
+
+    Args:
+        policy: a trained one. Its layers are shared, not copied.
+
+    The observations are what the policy's network sees: floating point, and where the peer normalised them
+    (`VecNormalize`), normalised by the same numbers, which are to be kept with the module.
+
+    Raises:
+        ValueError: another policy.
+
+    Example:
+        >>> from stable_baselines3 import PPO
+        >>> model = PPO(LogitNormalPolicy, "Pendulum-v1", n_steps=64, device="cpu", seed=0)
+        >>> actor, obs = LogitNormalActor(model.policy), torch.randn(5, 3)
+        >>> deployed = torch.export.export(actor, (obs,)).module()
+        >>> bool((deployed(obs).detach().numpy() == model.predict(obs.numpy(), deterministic=True)[0]).all())
+        True
+    """
+
+    def __init__(self, policy: LogitNormalPolicy) -> None:
+        if not isinstance(policy, LogitNormalPolicy):
+            raise ValueError(
+                f"LogitNormalActor takes a LogitNormalPolicy, as model.policy, and not {policy!r}"
+            )
+        super().__init__()
+        self.see, self.think, self.head = (
+            policy.pi_features_extractor,
+            policy.mlp_extractor,
+            policy.action_net,
+        )
+        box: Any = policy.action_space
+        like = next(policy.action_net.parameters())
+        for name, bound in (("low", box.low), ("high", box.high)):
+            self.register_buffer(name, torch.as_tensor(np.array(bound)).to(like))
+        self.low: Tensor
+        self.high: Tensor
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """Return the medians `[B, A]`, strictly inside the box."""
+        latent = self.head(self.think.forward_actor(self.see(obs)))
+        law = LogitNormal(latent, torch.ones_like(latent), self.low, self.high, validate_args=False)
+        return law.latent_to_value(latent)
 
 
 def _floating(array: NDArray[Any]) -> Tensor:

@@ -143,8 +143,8 @@ def bounded_actor(
         in_keys: what the network reads.
 
     Returns:
-        The actor, which writes the parameters, `latent` `[..., A]` and `latent_log_prob` `[...]`: give it to a loss.
-        And the same followed by the module that writes `action` `[..., A]`: let it act. Both draw, unless
+        First the actor for a loss, which writes the parameters, `latent` `[..., A]` and `latent_log_prob` `[...]`.
+        Second the same followed by the module that writes `action` `[..., A]`, to act with. Both draw, unless
         `set_exploration_type` says otherwise (TorchRL's own actors act without noise then).
 
     Raises:
@@ -238,12 +238,12 @@ def quiet_actor(
 ) -> tuple[ProbabilisticActor, TensorDictSequential]:
     """Return `bounded_actor` on a body, with a last layer that starts quietly, as *Which policy?* recommends.
 
-    Untrained, the policy is centred in its box and executes the standard deviation std. For deterministic actions, call
-    it below `set_exploration_type(ExplorationType.DETERMINISTIC)`: the median of a logit-normal, the mean of a Beta.
+    Untrained, the policy is centred in its box and executes the standard deviation std. To act by the median, call it
+    below `set_exploration_type(ExplorationType.MEDIAN)`. (`DETERMINISTIC` is the mean of a Beta.)
 
     Args:
         body: from what is under `in_keys` to features `[..., F]`; the last layer gets its device and dtype.
-        features: F.
+        features: how many, F.
         law: `LogitNormal` or `ScaledBeta`.
         low: `[A]` lower bounds of the action, in its own units.
         high: `[A]` upper bounds.
