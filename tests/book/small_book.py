@@ -13,12 +13,13 @@ ROOT = Path(__file__).resolve().parents[2]
 EXTENSIONS = ROOT / "book" / "_ext"
 
 
-def build(folder: Path, settings: Mapping[str, Any]) -> str:
+def build(folder: Path, settings: Mapping[str, Any], *, fresh: bool = True) -> str:
     """Build the pages of a folder into its html/, and return what the build complained of.
 
     Args:
         folder: which has an index, as a notebook or in Markdown.
         settings: of Sphinx, beside those of all such books.
+        fresh: whether what an earlier build stored is forgotten.
     """
     said = io.StringIO()
     settings = {"nb_execution_mode": "off", **settings}
@@ -34,7 +35,7 @@ def build(folder: Path, settings: Mapping[str, Any]) -> str:
                 confoverrides=settings,
                 status=None,
                 warning=said,
-                freshenv=True,
+                freshenv=fresh,
             )
             app.build()
     finally:
