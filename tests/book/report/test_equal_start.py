@@ -79,6 +79,20 @@ def test_each_difference_is_told_with_its_grade() -> None:
         "above on 1 of 6 robots (Hopper), below on 1 (HalfCheetah), suggested above on 1 (Swimmer), "
         "suggested below on 1 (Walker2d), too small to matter on 1 (Ant), no difference found on 1"
     )
+    assert answers.found(rows) == "found above on 1 of 6 robots (Hopper), below on 1 (HalfCheetah)"
+    assert [bar.group for bar in answers.bars(rows) if not bar.hollow] == ["Hopper", "HalfCheetah"]
+
+
+def test_a_hollow_marker_is_the_first_study_where_there_are_both() -> None:
+    rows = [
+        SECOND_ONE,
+        dataclasses.replace(SECOND_ONE, whole=False),
+        dataclasses.replace(SECOND_ONE, study=1),
+    ]
+    assert [bar.hollow for bar in answers.bars(rows, both_studies=True)] == [False, False, True]
+    both, one = (answers.by_endpoint(part, SECOND_ONE.algorithm)._repr_html_() for part in (rows, rows[:2]))
+    assert "Hollow: the first study" in both
+    assert "Filled: found by a corrected test. Hollow: not." in one
 
 
 @pytest.fixture

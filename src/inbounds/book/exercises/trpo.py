@@ -168,7 +168,9 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
     easy = torch.ones(3, dtype=torch.float64)
     done = {"when the residual has vanished, the next step divides 0 by 0: stop before": easy * torch.nan}
     cases = [case(1), case(2), case(4), Case((lambda v: 2 * v, easy, 5), easy / 2, done)]
-    verdict = judge_cases(function, cases, "right: nearest in the Krylov space, and it stops when it is done")
+    verdict = judge_cases(
+        function, cases, "right: the best that so many products allow, and it stops when it is done"
+    )
     if any(not torch.equal(each, b) for each in given):
         alias = "residual and direction are other names of it, and += or -= writes into it: residual = residual − …"
         return Judgement(verdict.exercise, False, f"b itself was changed: {alias}")

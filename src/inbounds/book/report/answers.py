@@ -109,6 +109,18 @@ def counted(rows: Sequence[Evidence]) -> str:
     return by_robot([(row.robot, _verdict(row)) for row in rows])
 
 
+def found(rows: Sequence[Evidence]) -> str:
+    """Return on which robots a difference is found, by a corrected test, and no other grade.
+
+    Example:
+        >>> found([])
+        'not run yet'
+    """
+    if not rows:
+        return "not run yet"
+    return "found " + by_robot([(row.robot, _verdict(row) if grade(row) == "found" else "") for row in rows])
+
+
 def _verdict(row: Evidence) -> str:
     """Return what a difference shows, in the words that `by_robot` sorts by."""
     above = row.difference.value > 0
@@ -164,9 +176,18 @@ def leading(rows: Sequence[Evidence], *, graded: bool = True) -> str:
     return "; ".join(told) or "nowhere"
 
 
-def bars(rows: Sequence[Evidence]) -> list[Bar]:
-    """Return the rows as bars of a forest; hollow where the first study's cells stand in for the second's."""
-    return [Bar(row.robot, row.law, row.difference, row.margin, hollow=row.study == 1) for row in rows]
+def bars(rows: Sequence[Evidence], *, both_studies: bool = False) -> list[Bar]:
+    """Return the rows as bars of a forest; hollow where nothing is found.
+
+    Args:
+        rows: of a panel.
+        both_studies: in the figure; then the first study's are hollow.
+    """
+
+    def hollow(row: Evidence) -> bool:
+        return row.study == 1 if both_studies else grade(row) != "found"
+
+    return [Bar(row.robot, row.law, row.difference, row.margin, hollow=hollow(row)) for row in rows]
 
 
 def by_algorithm(rows: Sequence[Evidence]) -> Shown:
@@ -230,7 +251,8 @@ def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:
 
 
 def _drawn(panels: Mapping[str, Sequence[Evidence]]) -> str:
-    drawn = {title: bars(rows) for title, rows in panels.items() if rows}
+    both = _studies(panels) == {1, 2}
+    drawn = {title: bars(rows, both_studies=both) for title, rows in panels.items() if rows}
     if not drawn:
         return html.NONE_FINISHED
     said = "Differences with 95 percent intervals, a group of rows per robot."
@@ -240,7 +262,7 @@ def _drawn(panels: Mapping[str, Sequence[Evidence]]) -> str:
 
 def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
     rows = [row for found in panels.values() for row in found]
-    studies = {row.study for row in rows}
+    studies = _studies(panels)
     said = [
         f"{_one_algorithm(panels)}Bars: 95 % bootstrap intervals of a difference of means. Grey: a difference too "
         "small to choose by, a fifth of what training adds on the robot."
@@ -251,10 +273,16 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
             "first study, whose Gaussian has a σ that depends on the state."
         )
     else:
+        said.append("Filled: found by a corrected test. Hollow: not.")
         said.append(
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )
     return " ".join([*said, *lent(rows)])
+
+
+def _studies(panels: Mapping[str, Sequence[Evidence]]) -> set[int]:
+    """Return which studies a figure's differences are from."""
+    return {row.study for rows in panels.values() for row in rows}
 
 
 def _one_algorithm(panels: Mapping[str, Sequence[Evidence]]) -> str:
