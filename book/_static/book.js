@@ -10,9 +10,17 @@
   };
 
   const SCROLLERS = "article :is(table, div.math mjx-container, figure):not(.inbounds-explorable *)";
-  const heading = (node) => node.closest("section")?.querySelector(":is(h1, h2, h3, h4, h5, h6)")?.firstChild?.textContent;
+  /* What a section is called, without the sign that links to it. */
+  const called = (section) => [...section?.querySelector(":is(h1, h2, h3, h4, h5, h6)")?.childNodes ?? []]
+    .map((part) => (part.matches?.(".headerlink") ? "" : part.textContent)).join("").trim();
+  const tableName = (node) => {
+    const section = node.closest("section");
+    const beside = [...section?.querySelectorAll("table") ?? []].filter((one) => one.closest("section") === section && !one.caption);
+    const which = beside.length > 1 ? `, ${beside.indexOf(node) + 1} of ${beside.length}` : "";
+    return `Table: ${called(section) || document.title}${which}`;
+  };
   const label = (node) => {
-    if (node.matches("table")) return `Table: ${heading(node) ?? document.title}`;
+    if (node.matches("table")) return tableName(node);
     const number = node.closest("div.math")?.querySelector(".eqno")?.firstChild?.textContent ?? "";
     return node.matches("figure") ? "Figure" : `Formula ${number}`.trim();
   };
@@ -25,6 +33,11 @@
     if (!node.matches("table")) node.setAttribute("aria-label", label(node));
     if (!node.matches("table, figure")) node.role = "group";
   };
+
+  /* A link in the title of a fold is followed. The theme's script, which knows no links there, would open or shut some fold. */
+  document.addEventListener("click", (event) => {
+    if (event.target.closest?.(".admonition.toggle > .admonition-title a")) event.stopPropagation();
+  }, true);
 
   /* What only draws is not read out: the theme's icons, and the arrows that its script puts beside folds. */
   const hush = () => {

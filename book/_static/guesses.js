@@ -159,7 +159,7 @@
       }
     }
     lock(box);
-    box.querySelector(".guess-check").addEventListener("click", () => check(box));
+    box.querySelector(".guess-check").addEventListener("click", (event) => { if (event.detail < 2) check(box); }); /* a double click is one */
   }
   tally();
 })();

@@ -109,8 +109,8 @@
     Search.stopPulse();
     Search.title.textContent = "Results";
     const count = list.childElementCount;
+    Search.status.setAttribute("role", "status"); /* before it says something */
     Search.status.textContent = count ? `${count} ${count === 1 ? "place" : "places"} for “${query}”`
       : `Nothing in the book has the words “${query}”. Fewer words find more.`;
-    Search.status.setAttribute("role", "status");
   };
 })();

@@ -75,6 +75,13 @@ def test_every_box_can_be_answered_right_and_wrong(page: Page, address: str, nam
     assert all(text.startswith(("Not so", "Off")) for text in page.locator(".guess-result").all_inner_texts())
 
 
+def test_a_double_click_checks_once(page: Page, address: str) -> None:
+    page.goto(address + CHOICES[0])
+    page.evaluate(ANSWER, True)
+    page.locator(".guess-check").first.dblclick()
+    assert all(text.startswith("Right") for text in page.locator(".guess-result").all_inner_texts())
+
+
 def test_a_box_that_another_page_has_checked_since_is_checked(context: BrowserContext, address: str) -> None:
     first, second = (context.new_page() for _ in range(2))
     for page in (first, second):

@@ -58,3 +58,19 @@ def test_a_focused_link_has_it_too(page: Page, address: str) -> None:
     assert page.evaluate("document.activeElement.getAttribute('aria-describedby')") == "inbounds-preview"
     page.keyboard.press("Tab")
     page.wait_for_function("() => !document.querySelector('[data-tried]').hasAttribute('aria-describedby')")
+
+
+def test_it_goes_when_the_pointer_goes_to_a_link_without_one(page: Page, address: str) -> None:
+    page = opened(page, address, "statement")
+    page.locator("[data-tried]").hover()
+    page.locator("#inbounds-preview").wait_for()
+    page.locator("[data-tried]").evaluate(
+        """node => {
+          const other = document.createElement('a');
+          const is = { href: 'preface.html#no-such', className: 'reference internal', textContent: 'elsewhere' };
+          Object.assign(other, is);
+          node.before(other, ' ');
+        }"""
+    )
+    page.get_by_role("link", name="elsewhere").hover()
+    page.locator("#inbounds-preview").wait_for(state="hidden", timeout=3000)

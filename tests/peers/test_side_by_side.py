@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
@@ -58,7 +59,16 @@ def test_a_failure_is_told_while_the_others_go_on(tmp_path: Path) -> None:
     assert (tmp_path / "finished").exists()
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Ctrl-C is heard, as it is not in what a script has started in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("heard")
 def test_ctrl_c_ends_what_runs_and_starts_nothing(tmp_path: Path) -> None:
     def interrupt() -> None:
         wait_for(tmp_path / "0")

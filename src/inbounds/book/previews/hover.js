@@ -49,6 +49,7 @@
     box.style.top = under ? `${around.bottom + GAP}px` : `${around.top - GAP - box.offsetHeight}px`;
   };
   const open = async (link) => {
+    if (link !== shown) close(); /* whether or not this link has something to show */
     const [page, id] = parts(link);
     if (!page || !MAYBE.test(id)) return;
     await load(page);
