@@ -15,7 +15,8 @@
     .map((part) => (part.matches?.(".headerlink") ? "" : part.textContent)).join("").trim();
   const tableName = (node) => {
     const section = node.closest("section");
-    const beside = [...section?.querySelectorAll("table") ?? []].filter((one) => one.closest("section") === section && !one.caption);
+    const beside = [...section?.querySelectorAll("table") ?? []]
+      .filter((one) => one.closest("section") === section && !one.caption && !one.closest(".inbounds-explorable"));
     const which = beside.length > 1 ? `, ${beside.indexOf(node) + 1} of ${beside.length}` : "";
     return `Table: ${called(section) || document.title}${which}`;
   };

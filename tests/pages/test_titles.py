@@ -3,8 +3,8 @@
 import pytest
 from playwright.sync_api import Page
 
-NAMES = """nodes => nodes.filter((table) => !table.caption && table.checkVisibility())
-  .map((table) => table.ariaLabel)"""
+TABLES = """[...document.querySelectorAll('article table')]
+  .filter((table) => !table.closest('.inbounds-explorable') && !table.caption && table.checkVisibility())"""
 
 
 def test_a_link_in_a_solutions_title_leads_to_its_exercise_and_opens_nothing(
@@ -31,6 +31,7 @@ def test_tables_without_a_caption_are_called_by_their_section_and_no_two_alike(
     page: Page, address: str, name: str
 ) -> None:
     page.goto(f"{address}notebooks/{name}.html", wait_until="networkidle")
-    names = page.locator("article table:not(.inbounds-explorable table)").evaluate_all(NAMES)
+    page.wait_for_function(f"{TABLES}.every((table) => table.ariaLabel)")
+    names = page.evaluate(f"{TABLES}.map((table) => table.ariaLabel)")
     assert all(any(letter.isalpha() for letter in each.removeprefix("Table: ")) for each in names)
     assert len(set(names)) == len(names)
