@@ -4,6 +4,7 @@ Sphinx numbers statements, exercises and equations by chapter, 3.1, where the ch
 other pages by a bare 1, 2, 3. Read in a chapter, a bare number seems to be one of that chapter.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from sphinx.application import Sphinx
@@ -12,19 +13,22 @@ from sphinx.environment import BuildEnvironment
 DEPTH = "D"  # of "depth": the pages of *Going deeper*
 
 
-def mark(app: Sphinx, env: BuildEnvironment) -> list[str]:
-    """Put the letter before each number that has no chapter's."""
+def renumber(env: BuildEnvironment, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> None:
+    """Change all numbers that Sphinx has given."""
     for kinds in env.toc_fignumbers.values():
         for numbers in kinds.values():
-            numbers.update({key: (DEPTH, *n) for key, n in numbers.items() if len(n) == 1})
+            numbers.update({key: change(number) for key, number in numbers.items()})
+
+
+def mark(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Put the letter before each number that has no chapter's."""
+    renumber(env, lambda number: (DEPTH, *number) if len(number) == 1 else number)
     return []
 
 
 def unmark(app: Sphinx, env: BuildEnvironment, *changes: set[str]) -> list[str]:
     """Take it away from what an earlier build stored, as Sphinx compares old numbers with new ones."""
-    for kinds in env.toc_fignumbers.values():
-        for numbers in kinds.values():
-            numbers.update({key: n[1:] for key, n in numbers.items() if n[0] == DEPTH})
+    renumber(env, lambda number: number[1:] if number[0] == DEPTH else number)
     return []
 
 

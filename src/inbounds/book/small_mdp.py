@@ -234,7 +234,7 @@ def ledge(
     last cell it is also charged for a fall, times the probability that it falls. A fall ends the episode.
 
     Args:
-        cells: how many, N.
+        cells: of the road, N.
         gamma: discount.
         grip: probability that a push moves the rover by a cell.
         battery: probability that the episode goes on after a step.
@@ -259,7 +259,7 @@ def slope(
     It starts anywhere. The reward is −climb (1 + a)/2 − 0.1a², and one more in the sun.
 
     Args:
-        cells: how many, N.
+        cells: of the road, N.
         gamma: discount.
         grip: probability that a push moves the rover by a cell.
         battery: probability that the episode goes on after a step.

@@ -159,7 +159,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
         latent = _floating(scaled_action)
-        law = self._law(torch.zeros_like(latent))
+        law = _law(latent, *self._limits(latent))
         low, high = self._bounds  # of a narrower type than the law's, they could be reached by rounding
         value = law.latent_to_value(latent).numpy().astype(low.dtype)
         return np.clip(value, np.nextafter(low, high), np.nextafter(high, low))
@@ -167,11 +167,12 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
         """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
         value = _floating(action)
-        return self._law(torch.zeros_like(value)).value_to_latent(value).numpy()
+        return _law(value, *self._limits(value)).value_to_latent(value).numpy()
 
-    def _law(self, loc: Tensor) -> LogitNormal:
-        low, high = (torch.as_tensor(np.array(bound)).to(loc) for bound in self._bounds)
-        return LogitNormal(loc, torch.ones_like(loc), low, high, validate_args=False)
+    def _limits(self, like: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the bounds `[A]` as tensors of the type and on the device of another."""
+        low, high = (torch.as_tensor(np.array(bound)).to(like) for bound in self._bounds)
+        return low, high
 
     @property
     def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -213,18 +214,21 @@ class LogitNormalActor(nn.Module):
             policy.mlp_extractor,
             policy.action_net,
         )
-        box: Any = policy.action_space
-        like = next(policy.action_net.parameters())
-        for name, bound in (("low", box.low), ("high", box.high)):
-            self.register_buffer(name, torch.as_tensor(np.array(bound)).to(like))
+        low, high = policy._limits(next(policy.action_net.parameters()))
+        self.register_buffer("low", low)
+        self.register_buffer("high", high)
         self.low: Tensor
         self.high: Tensor
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the medians `[B, A]`, strictly inside the box."""
         latent = self.head(self.think.forward_actor(self.see(obs)))
-        law = LogitNormal(latent, torch.ones_like(latent), self.low, self.high, validate_args=False)
-        return law.latent_to_value(latent)
+        return _law(latent, self.low, self.high).latent_to_value(latent)
+
+
+def _law(like: Tensor, low: Tensor, high: Tensor) -> LogitNormal:
+    """Return a law on the box, of which only the map between latents and actions `[..., A]` counts."""
+    return LogitNormal(torch.zeros_like(like), torch.ones_like(like), low, high, validate_args=False)
 
 
 def _floating(array: NDArray[Any]) -> Tensor:

@@ -243,7 +243,7 @@ def quiet_actor(
 
     Args:
         body: from what is under `in_keys` to features `[..., F]`; the last layer gets its device and dtype.
-        features: how many, F.
+        features: that the body puts out, F.
         law: `LogitNormal` or `ScaledBeta`.
         low: `[A]` lower bounds of the action, in its own units.
         high: `[A]` upper bounds.

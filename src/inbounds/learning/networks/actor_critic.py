@@ -67,7 +67,7 @@ class ActorCritic:
 
     Args:
         policy: the family and the box.
-        obs_dim: how many, O.
+        obs_dim: numbers of an observation, O.
         config: shape and initialisation.
         generators: one torch generator per seed; each draws its own policy network, then its value network.
 

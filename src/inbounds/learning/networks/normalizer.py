@@ -22,8 +22,8 @@ class RunningNormalizer:
     """Running mean and variance of the observations of S seeds, in float64.
 
     Args:
-        num_seeds: how many, S.
-        obs_dim: how many, O.
+        num_seeds: seeds, S.
+        obs_dim: numbers of an observation, O.
         dtype: of the observations handed out.
 
     Example:

@@ -88,7 +88,7 @@ class Mlp:
     """The weights of S perceptrons of one shape.
 
     Args:
-        num_seeds: how many, S.
+        num_seeds: perceptrons, S.
         sizes: of the layers, inputs first: (O, 64, 64, outputs).
         dtype: of the weights, torch.float32 or torch.float64.
 

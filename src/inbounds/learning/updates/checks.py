@@ -67,8 +67,8 @@ def check_minibatches(horizon: int, minibatch_size: int, normalized: int | None 
     """Raise a ValueError unless minibatches divide the rollout without a rest.
 
     Args:
-        horizon: how many, T.
-        minibatch_size: how many, B.
+        horizon: env steps of the rollout, T.
+        minibatch_size: env steps of a minibatch, B.
         normalized: number of advantages that are normalised together; None where they are not.
 
     Example:

@@ -98,7 +98,7 @@ class DialEnv(VectorEnv[Any, Any, Any]):
 
     Args:
         task: the knobs.
-        num_envs: how many, S.
+        num_envs: tasks stepped at once, S.
 
     Example:
         >>> envs = DialEnv(DialTask(0.5), num_envs=2)
