@@ -122,14 +122,18 @@ class Guess(SphinxDirective):
             raise ValueError(
                 f"a factor like {within} needs a truth above 0 ({truth:g}) and has to be above 1"
             )
-        attributes = {"step": self.options.get("step", "any"), "inputmode": "decimal"}
-        field = element("input", type="number", **attributes)
+        if "step" in self.options and "range" not in self.options:
+            raise ValueError("a :step: is that of the slider, which needs a :range:")
+        field = element("input", type="text", autocomplete="off")
         children: list[nodes.Node] = [field]
+        if within.startswith("x") or not self.options.get("range", "-").startswith("-"):
+            field["attributes"]["inputmode"] = (
+                "decimal"  # a phone's keys for digits, which have no minus sign
+            )
         if "range" in self.options:
             low, high = limits(self.options["range"])
             if not low <= truth <= high:
                 raise ValueError(f"the truth, {truth:g}, lies outside its :range:, {low:g} to {high:g}")
-            field["attributes"] |= {"min": f"{low:g}", "max": f"{high:g}"}
             step = self.options.get("step", f"{(high - low) / 100:g}")
             slider = {"min": f"{low:g}", "max": f"{high:g}", "step": step, "value": f"{(low + high) / 2:g}"}
             children.insert(0, element("input", type="range", aria_label="Your guess, as a slider", **slider))

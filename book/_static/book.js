@@ -47,6 +47,11 @@
   hush();
   addEventListener("load", hush);
 
+  /* The theme calls each button of a fold "Toggle hidden content": it is called what it folds. */
+  addEventListener("load", () => {
+    for (const button of document.querySelectorAll(".admonition-title > .toggle-button")) button.ariaLabel = button.parentElement.textContent.trim();
+  });
+
   /* Two buttons of the header show more than their labels say: "Search this book", and which mode is on. */
   document.querySelectorAll(".search-button-field").forEach((button) => button.removeAttribute("aria-label"));
   const MODES = { light: "Light", dark: "Dark", auto: "System Settings" };

@@ -17,16 +17,24 @@
 
   const NEAR = 0.5;
   const inputs = (guess) => [...guess.querySelectorAll(":is(.guess-options, .guess-number) input")];
-  const field = (guess) => guess.querySelector('input[type="number"]');
+  const field = (guess) => guess.querySelector('input[type="text"]');
   const slider = (guess) => guess.querySelector('input[type="range"]');
   const list = (letters) => [...letters].map((letter) => `(${letter})`).join(", ");
 
+  /* What was typed as JavaScript writes it, or "" if it is no number: 0,4 is 0.4, but 3,000 is three thousand; a unit may stand behind. */
+  const THOUSANDS = /^([+-]?[1-9]\d{0,2})((?:,\d{3})+)(?!\d)/;
+  const number = (text) => {
+    const bare = text.replace(/\s/g, "").replace(/%$/, "").replace("\u2212", "-");
+    const plain = bare.replace(THOUSANDS, (_, first, more) => first + more.replaceAll(",", "")).replace(",", ".");
+    return plain !== "" && Number.isFinite(Number(plain)) ? plain : "";
+  };
+
   /* A guess as text: letters, or a number; empty while there is none. No box ticked is a guess where several may hold: the button says so. */
-  const taken = (guess) => guess.dataset.kind === "number" ? field(guess).value
+  const taken = (guess) => guess.dataset.kind === "number" ? number(field(guess).value)
     : inputs(guess).filter((input) => input.checked).map((input) => input.value).join("");
   const show = (guess, value) => {
     for (const input of inputs(guess)) {
-      if (input.type === "number") input.value = value;
+      if (input.type === "text") input.value = value;
       else if (input.type === "range") input.value = value === "" ? input.defaultValue : value;
       else input.checked = value.includes(input.value);
     }
@@ -49,8 +57,8 @@
   const says = (guess, value, points) => {
     const { kind, right, shown, unit } = guess.dataset;
     const verdict = points === 1 ? "Right" : points === NEAR ? "Near" : kind === "number" ? "Off" : "Not so";
-    const number = (text) => `${text}${unit ? `\u202f${unit}` : ""}`;
-    if (kind === "number") return `${verdict}: you said ${number(value.replace("-", "\u2212"))}, it is ${number(shown)}.`;
+    const set = (text) => `${text}${unit ? `\u202f${unit}` : ""}`;
+    if (kind === "number") return `${verdict}: you said ${set(value.replace("-", "\u2212"))}, it is ${set(shown)}.`;
     const yours = value ? `you chose ${list(value)}` : "you chose none";
     return points === 1 ? `${verdict}, ${list(value)}.` : `${verdict}: ${yours}, right ${right.length > 1 ? "are" : "is"} ${list(right)}.`;
   };
@@ -83,6 +91,11 @@
     for (const guess of guesses(box)) inputs(guess).forEach((input) => { input.disabled = done; });
     button.textContent = done ? "Guess again" : "Check my guess";
   };
+  const button = (text, press) => {
+    const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
+    made.addEventListener("click", press);
+    return made;
+  };
   const tally = () => {
     const points = Object.values(kept).map((one) => one.score);
     const count = (score) => points.filter((one) => one === score).length;
@@ -90,16 +103,21 @@
     for (const box of boxes) {
       const line = box.querySelector(".guess-tally");
       if (!known(box)) { line.replaceChildren(); continue; }
-      const forget = document.createElement("button");
-      forget.type = "button";
-      forget.textContent = "Forget all my guesses";
-      forget.addEventListener("click", () => {
+      const forget = button("Forget all my guesses", () => {
+        const before = kept;
         kept = {};
         keep();
         boxes.forEach(clear);
         tally();
-        line.textContent = "Forgotten.";
-        box.querySelector(".guess-check").focus();
+        const back = button("Bring them back", () => {
+          kept = { ...before, ...kept };
+          keep();
+          boxes.forEach(recall);
+          tally();
+          box.querySelector(".guess-check").focus();
+        });
+        line.replaceChildren("Forgotten. ", back);
+        back.focus();
       });
       line.replaceChildren(`In this book you were right in ${count(1)} of ${points.length} guesses so far${near}. `, forget);
     }
@@ -126,7 +144,8 @@
     for (const guess of guesses(box)) {
       const result = guess.querySelector(".guess-result");
       delete result.dataset.score;
-      result.textContent = missing.includes(guess) ? "No guess yet." : "";
+      const typed = guess.dataset.kind === "number" && field(guess).value.trim();
+      result.textContent = !missing.includes(guess) ? "" : typed ? `Not a number: ${typed}` : "No guess yet.";
     }
     if (missing.length) { inputs(missing[0])[0].focus(); return; }
     for (const guess of guesses(box)) {
@@ -141,24 +160,30 @@
     if (fold) fold.open = true;
   };
 
+  /* Show what is known of a box, by today's truth, which may have changed since. */
+  const recall = (box) => {
+    for (const guess of guesses(box)) {
+      const mine = kept[guess.dataset.name];
+      if (!mine) continue;
+      mine.score = score(guess, mine.guess);
+      show(guess, mine.guess);
+      tell(guess);
+    }
+    lock(box);
+  };
+
   read();
   for (const box of boxes) {
     for (const guess of guesses(box)) {
       slider(guess)?.addEventListener("input", () => { field(guess).value = slider(guess).value; });
-      if (slider(guess)) field(guess).addEventListener("input", () => { slider(guess).value = field(guess).value; });
+      if (slider(guess)) field(guess).addEventListener("input", () => { slider(guess).value = number(field(guess).value); });
       field(guess)?.addEventListener("keydown", (event) => {
         if (event.key !== "Enter") return;
         event.preventDefault(); /* or it would press the button that has the focus by then */
         check(box);
       });
-      const mine = kept[guess.dataset.name];
-      if (mine) { /* by today's truth, which may have changed since */
-        mine.score = score(guess, mine.guess);
-        show(guess, mine.guess);
-        tell(guess);
-      }
     }
-    lock(box);
+    recall(box);
     box.querySelector(".guess-check").addEventListener("click", (event) => { if (event.detail < 2) check(box); }); /* a double click is one */
   }
   tally();

@@ -160,6 +160,7 @@ def instead(text: str, other: str) -> Callable[[str], str]:
         (instead(":truth: share", ":truth: shore"), "no cell glues its :truth:, 'shore'"),
         (instead(":range: 0 100", ":range: 60 100"), "55.3, lies outside its :range:"),
         (instead(":range: 0 100", ":range: 100 0"), ":range: is two numbers"),
+        (instead(":range: 0 100", ":step: 1"), "a :step: is that of the slider"),
         (instead(":within: 5", ":within: close"), ":within: is a distance"),
         (instead(":within: 5", ":within: x1"), "has to be above 1"),
         (without(":truth: share\n"), "without :truth: nothing is compared"),

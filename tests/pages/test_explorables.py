@@ -102,6 +102,27 @@ def test_answers_the_keyboard(opened: Page) -> None:
             assert after[1] == shown
 
 
+def test_goes_back_to_the_start_and_is_described_as_it_is(opened: Page) -> None:
+    for explorable in explorables(opened):
+        back = explorable.get_by_role("button", name="Back to the start")
+        handles, picture = explorable.locator("[role=slider]").all(), explorable.locator("[role=img]").first
+        if back.get_attribute("aria-disabled") == "false":
+            back.click()  # what another test has moved
+        first = readout(explorable)
+        assert picture.get_attribute("aria-label") == explorable.get_attribute("data-alt")
+        for handle in handles:
+            handle.focus()
+            at_the_left = handle.get_attribute("aria-valuenow") == handle.get_attribute("aria-valuemin")
+            opened.keyboard.press("ArrowRight" if at_the_left else "ArrowLeft")
+        assert readout(explorable) != first
+        assert "sliders are now" in (picture.get_attribute("aria-label") or "")
+        assert back.get_attribute("aria-disabled") == "false"
+        back.click()
+        assert readout(explorable) == first
+        assert picture.get_attribute("aria-label") == explorable.get_attribute("data-alt")
+        assert back.get_attribute("aria-disabled") == "true"
+
+
 def test_sliders_are_reached_by_tab(opened: Page) -> None:
     focused = """() => {
       let node = document.activeElement;

@@ -15,7 +15,7 @@ ANSWER = """right => {
     const { kind, right: key, truth, within } = guess.dataset;
     if (kind === 'number') {
       const far = within.startsWith('x') ? truth * within.slice(1) ** 3 : Number(truth) + 3 * within;
-      guess.querySelector('input[type=number]').value = right ? truth : far;
+      guess.querySelector('input[type=text]').value = right ? truth : far;
     } else for (const input of guess.querySelectorAll('input')) {
       if (key.includes(input.value) === right) input.click();
     }
@@ -56,7 +56,13 @@ def test_guesses_are_scored_and_remembered(page: Page, address: str, scheme: str
     assert page.locator(".guess-result").all_inner_texts() == told
     assert page.locator(".inbounds-guess input:enabled").count() == 0
     page.get_by_role("button", name="Forget all my guesses").click()
-    assert page.locator(".guess-tally").inner_text() == "Forgotten."
+    assert page.locator(".guess-tally").inner_text().startswith("Forgotten.")
+    assert all(text == "" for text in page.locator(".guess-result").all_inner_texts())
+    page.get_by_role("button", name="Bring them back").click()
+    assert page.locator(".guess-result").all_inner_texts() == told
+    page.reload()
+    assert page.locator(".guess-result").all_inner_texts() == told
+    page.get_by_role("button", name="Forget all my guesses").click()
     page.reload()
     assert all(text == "" for text in page.locator(".guess-result").all_inner_texts())
     page.goto(start + CHOICES[0])
@@ -98,8 +104,43 @@ def test_a_box_that_another_page_has_checked_since_is_checked(context: BrowserCo
 def test_who_answers_by_the_keyboard_stays_at_the_box(page: Page, address: str) -> None:
     page.goto(address + NUMBERS[0])
     page.evaluate(ANSWER, True)
-    page.locator(".inbounds-guess input[type=number]").first.press("Enter")
+    page.locator(".inbounds-guess input[type=text]").first.press("Enter")
     assert page.evaluate("document.activeElement.textContent") == "Guess again"
+
+
+@pytest.mark.parametrize(
+    ("typed", "understood"),
+    [
+        ("0.4", "0.4"),
+        ("0,4", "0.4"),
+        (" 12 % ", "12"),
+        ("−3", "−3"),
+        ("3,000", "3000"),
+        ("1,234,567.5", "1234567.5"),
+        ("1,2345", "1.2345"),
+    ],
+)
+def test_a_number_may_be_typed_as_people_type_it(
+    page: Page, address: str, typed: str, understood: str
+) -> None:
+    page.goto(address + NUMBERS[0])
+    page.evaluate(ANSWER, True)
+    first = page.locator(".inbounds-guess[data-kind=number]").first
+    first.locator("input[type=text]").fill(typed)
+    first.locator("input[type=text]").press("Enter")
+    said = first.locator(".guess-result").inner_text()
+    assert f": you said {understood}" in said
+    assert said.split(f"you said {understood}")[1][0] in ",\u202f"
+
+
+def test_what_is_no_number_is_no_guess(page: Page, address: str) -> None:
+    page.goto(address + NUMBERS[0])
+    page.evaluate(ANSWER, True)
+    field = page.locator(".inbounds-guess input[type=text]").first
+    field.fill("a lot")
+    field.press("Enter")
+    assert "Not a number: a lot" in page.locator(".guess-result").all_inner_texts()
+    assert page.locator(".predict details").first.get_attribute("open") is None
 
 
 def test_copying_the_page_leaves_a_choice_as_it_is(page: Page, address: str) -> None:

@@ -4,7 +4,7 @@ Chromium draws WebGL in software here, and a phone is an emulated viewport with 
 """
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 from PIL import Image
@@ -169,16 +169,22 @@ def test_a_push_moves_it(reader: BrowserContext, address: str) -> None:
     page = start(reader, address + PAGE)
     place = robot(page)
     place.get_by_role("button", name="Pause").click()
-    speeds = []
-    for push in (False, True):
+    view = place.locator(".inbounds-live-view").first
+    pushes: dict[str, Callable[[], None]] = {
+        "none": lambda: None,
+        "by a key": lambda: view.press("ArrowRight"),
+        "by a click on its left": lambda: view.click(position={"x": 20, "y": 60}),
+    }
+    speeds = {}
+    for name, push in pushes.items():
         place.get_by_role("button", name="Same start again").click()
-        if push:
-            place.locator(".inbounds-live-view").first.press("ArrowRight")
+        push()
         for _ in range(4):
             place.get_by_role("button", name="One step").click()
         page.wait_for_timeout(300)
-        speeds.append(reading(page, "Speed"))
-    assert speeds[1] > speeds[0] + 0.3
+        speeds[name] = reading(page, "Speed")
+    assert speeds["by a key"] > speeds["none"] + 0.3
+    assert speeds["by a click on its left"] == speeds["by a key"]
 
 
 @needs_robots

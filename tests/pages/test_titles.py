@@ -26,6 +26,15 @@ def test_a_link_in_a_solutions_title_leads_to_its_exercise_and_opens_nothing(
     assert errors == []
 
 
+@pytest.mark.parametrize("name", ["ppo", "kl_invariance", "trpo"])
+def test_the_button_of_a_fold_is_called_what_it_folds(page: Page, address: str, name: str) -> None:
+    page.goto(f"{address}notebooks/{name}.html", wait_until="load")
+    folds = page.locator(".admonition.toggle")
+    names = [button.get_attribute("aria-label") for button in folds.locator(".toggle-button").all()]
+    assert names == [title.strip() for title in folds.locator("> .admonition-title").all_inner_texts()]
+    assert len(set(names)) == len(names) > 1
+
+
 @pytest.mark.parametrize("name", ["ppo", "boundary_effect", "what_happened", "all_tables"])
 def test_tables_without_a_caption_are_called_by_their_section_and_no_two_alike(
     page: Page, address: str, name: str

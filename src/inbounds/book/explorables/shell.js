@@ -3,7 +3,8 @@
 "use strict";
 
 (() => {
-  const containers = new WeakMap(); // Bokeh document -> the element it is shown in
+  const places = new WeakMap(); // Bokeh document -> the element it is shown in, its pictures, and where its sliders stood at first
+  const MOVED = "As the sliders are now; the table and the text below say what it shows.";
 
   const bokeh = (version) => globalThis.Bokeh?.[version] ?? globalThis.Bokeh;
   const all = (doc, type) => [...doc.all_models].filter((model) => model.type === type);
@@ -11,8 +12,8 @@
 
   // The controls changed: compute what the page shows, and show it. Called by the CustomJS of every control.
   inbounds.refresh = (doc) => {
-    const container = containers.get(doc);
-    if (!container) return;
+    if (!places.has(doc)) return;
+    const { container, pictures, starts } = places.get(doc);
     const controls = all(doc, "Slider");
     const state = inbounds.models[container.dataset.model](
       Object.fromEntries(controls.map((slider) => [slider.name, slider.value])),
@@ -23,6 +24,10 @@
       state.table[row.dataset.row].forEach((text, i) => (row.cells[i + 1].textContent = text));
     }
     container.querySelector(".inbounds-note").textContent = state.note;
+    const moved = controls.some((slider, i) => slider.value !== starts[i]);
+    container.querySelector(".inbounds-back").setAttribute("aria-disabled", String(!moved));
+    const shown = moved ? `${container.getAttribute("aria-label")}. ${MOVED}` : container.dataset.alt;
+    for (const picture of pictures) picture.setAttribute("aria-label", shown);
   };
 
   const isDark = () => {
@@ -82,15 +87,21 @@
     const views = await api.embed.embed_item(item, live.querySelector(".inbounds-plot"));
     const [root] = views.roots;
     const doc = root.model.document;
-    containers.set(doc, container);
+    const sliders = all(doc, "Slider");
+    const pictures = all(doc, "Figure").map((plot) => views.find_one(plot));
+    const starts = sliders.map(({ value }) => value);
+    const back = Object.assign(document.createElement("button"), {
+      type: "button", className: "inbounds-back", textContent: "Back to the start",
+      onclick: () => sliders.forEach((slider, i) => (slider.value = starts[i])),
+    });
+    live.append(back);
+    places.set(doc, { container, pictures: pictures.map(({ el }) => el), starts });
     paint(container, doc);
     inbounds.refresh(doc);
-    for (const slider of all(doc, "Slider")) label(slider, views.find_one(slider));
-    for (const plot of all(doc, "Figure")) {
-      const { el, canvas_view } = views.find_one(plot);
+    for (const slider of sliders) label(slider, views.find_one(slider));
+    for (const { el, canvas_view } of pictures) {
       canvas_view.events_el.removeAttribute("tabindex"); // the sliders answer the keyboard; the picture does not
       el.setAttribute("role", "img");
-      el.setAttribute("aria-label", container.dataset.alt);
     }
     const follow = new MutationObserver(() => paint(container, doc));
     follow.observe(document.documentElement, { attributeFilter: ["data-theme"] });

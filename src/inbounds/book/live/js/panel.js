@@ -10,6 +10,8 @@ inbounds.live.Panel = class {
     beyond: "Draws outside the box",
   };
 
+  static STILL = 5; // pixels: a pointer that moved less has clicked
+
   // show: the inbounds.live.Show it belongs to; policy: of the catalogue, such as ppo-gaussian, or "" for none; way: to act.
   constructor(show, title, policy, way) {
     const { make, choice, slider, button } = inbounds.live.dom;
@@ -53,7 +55,7 @@ inbounds.live.Panel = class {
     this.listen();
   }
 
-  // A drag on the picture pushes, and so do the arrow keys.
+  // A drag on the picture pushes, and so do the arrow keys; a click or tap pushes away from its side of the picture.
   listen() {
     const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     this.view.addEventListener("keydown", (event) => {
@@ -69,7 +71,13 @@ inbounds.live.Panel = class {
     this.view.addEventListener("pointermove", (event) => {
       if (from) this.show.push((event.clientX - from[0]) / 100, (from[1] - event.clientY) / 100);
     });
-    for (const end of ["pointerup", "pointercancel"]) this.view.addEventListener(end, () => (from = null));
+    this.view.addEventListener("pointerup", (event) => {
+      const { left, width } = this.view.getBoundingClientRect();
+      const dragged = !from || Math.hypot(event.clientX - from[0], event.clientY - from[1]) > inbounds.live.Panel.STILL;
+      if (!dragged) this.show.push(event.clientX < left + width / 2 ? 1 : -1, 0);
+      from = null;
+    });
+    this.view.addEventListener("pointercancel", () => (from = null));
   }
 
   // Bring in a policy and its robot. Whatever was there goes.
@@ -95,7 +103,7 @@ inbounds.live.Panel = class {
     this.family = policy.family;
     this.node.dataset.family = policy.family;
     const name = live.catalogue.policies[this.policy];
-    this.view.setAttribute("aria-label", `${live.robots[robot].name} moved by ${name}. Arrow keys push it, and so does a drag.`);
+    this.view.setAttribute("aria-label", `${live.robots[robot].name} moved by ${name}. Arrow keys push it, and so does a drag; a click pushes it away.`);
     this.motors.setAttribute("aria-label", `For each motor of ${name}: the density of its action, what was drawn and what was executed.`);
   }
 
