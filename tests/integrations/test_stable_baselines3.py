@@ -204,6 +204,30 @@ def test_observations_may_have_names() -> None:
     assert abs(model.predict(obs)[0]) < 2
 
 
+class Seen(gymnasium.Env):
+    """A camera's picture, channels last, whose brightness is what there is to see."""
+
+    def __init__(self) -> None:
+        self.observation_space = spaces.Box(0, 255, (36, 36, 3), np.uint8)
+        self.action_space = spaces.Box(np.float32([0, -2]), np.float32([8, 1]))
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.observation_space.sample(), {}
+
+    def step(self, action):
+        assert self.action_space.contains(action)
+        return self.observation_space.sample(), 0.0, False, False, {}
+
+
+def test_observations_may_be_pictures() -> None:
+    model = PPO(LogitNormalPolicy, Seen(), n_steps=16, batch_size=16, n_epochs=1, device="cpu", seed=0)
+    peer = PPO("CnnPolicy", Seen(), n_steps=16, batch_size=16, n_epochs=1, device="cpu", seed=0)
+    kinds = [type(each) for each in model.policy.modules() if not isinstance(each, LogitNormalPolicy)]
+    assert kinds == [type(each) for each in list(peer.policy.modules())[1:]]
+    model.learn(16)
+
+
 def test_numbers_of_any_kind_are_mapped_and_actions_have_the_boxs_type() -> None:
     class Fine(Tank):
         action_space = spaces.Box(-0.3, 0.3, (2,), np.float64)

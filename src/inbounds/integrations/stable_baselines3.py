@@ -28,7 +28,8 @@ from inbounds.integrations.quiet import quiet_scale
 try:
     from stable_baselines3.common.distributions import DiagGaussianDistribution
     from stable_baselines3.common.policies import ActorCriticPolicy
-    from stable_baselines3.common.torch_layers import CombinedExtractor
+    from stable_baselines3.common.preprocessing import is_image_space
+    from stable_baselines3.common.torch_layers import CombinedExtractor, NatureCNN
 except ImportError as error:
     raise ImportError(
         'stable-baselines3 is not installed: pip install ".[integrations]" in the source tree'
@@ -104,7 +105,8 @@ class LogitNormalPolicy(ActorCriticPolicy):
     """The peer's actor-critic with logit-normal actions in any bounded box; see the module.
 
     Args:
-        observation_space: as the peer's; a Dict, too.
+        observation_space: as the peer's; a Dict or images, too, which get the networks of `MultiInputPolicy` and
+            `CnnPolicy`.
         action_space: a bounded, one-dimensional Box.
         lr_schedule: as the peer's.
         **options: as the peer's; `log_std_init` is the log σ of the *latent*: 0 executes a standard deviation of
@@ -136,10 +138,10 @@ class LogitNormalPolicy(ActorCriticPolicy):
         require_box(action_space)
         if options.get("use_sde"):
             raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
-        if isinstance(observation_space, gymnasium.spaces.Dict):
-            options.setdefault(
-                "features_extractor_class", CombinedExtractor
-            )  # as the peer's `MultiInputPolicy`
+        if isinstance(observation_space, gymnasium.spaces.Dict):  # as the peer's `MultiInputPolicy`
+            options.setdefault("features_extractor_class", CombinedExtractor)
+        elif is_image_space(observation_space):  # as the peer's `CnnPolicy`
+            options.setdefault("features_extractor_class", NatureCNN)
         super().__init__(observation_space, action_space, lr_schedule, **options)
         self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
 
@@ -188,8 +190,9 @@ class LogitNormalActor(nn.Module):
     Args:
         policy: a trained one. Its layers are shared, not copied.
 
-    The observations are what the policy's network sees: floating point, and where the peer normalised them
-    (`VecNormalize`), normalised by the same numbers, which are to be kept with the module.
+    The observations are what the policy's network sees: floating point, pictures channels first and divided by 255,
+    and where the peer normalised them (`VecNormalize`), normalised by the same numbers, which are to be kept with the
+    module.
 
     Raises:
         ValueError: another policy.
