@@ -9,7 +9,7 @@ from sphinx.application import Sphinx
 
 from inbounds.book.pages.graded import graders_of
 
-MARK = ' <span class="graded">graded by <code>inbounds grade</code></span>'
+MARK = '<span aria-hidden="true">&nbsp;·</span> <span class="graded">graded by <code>inbounds grade</code></span>'
 
 
 def marked(body: str, labels: list[str]) -> str:

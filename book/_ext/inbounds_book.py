@@ -45,6 +45,8 @@ FOLDER = "explorables"
 EXPLORABLE = 'class="inbounds-explorable"'
 LIVE_FOLDER = "live"  # filled by tools/build_book.py
 LIVE_ROBOT = 'class="inbounds-live-robot"'
+SHORT = 20
+"""Characters of code that stay on one line of text, on a phone too."""
 
 
 def use_named_cache(app: Sphinx, config: Config) -> None:
@@ -255,6 +257,19 @@ def follows_number(text: nodes.Text) -> bool:
     return isinstance(before, nodes.Element) and "pasted-text" in before["classes"]
 
 
+def keep_words(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Keep short code on one line, and a formula with the word that a hyphen ties to it, such as $p$-value."""
+    for literal in doctree.findall(nodes.literal):
+        if len(literal.astext()) <= SHORT:
+            literal["classes"].append("together")
+    for math in list(doctree.findall(nodes.math)):
+        place = math.parent.index(math)
+        after = math.parent[place + 1] if place + 1 < len(math.parent) else None
+        if isinstance(after, nodes.Text) and (tied := re.match(r"-\w+", after)):
+            both = nodes.inline("", "", math.deepcopy(), nodes.Text(tied[0]), classes=["together"])
+            math.parent[place : place + 2] = [both, nodes.Text(after[tied.end() :])]
+
+
 # "auto" shows the logo of either theme until the theme's script has run, and then the page moves.
 CHOOSE_THEME = """if (document.documentElement.dataset.theme === "auto")
   document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";"""
@@ -279,6 +294,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("missing-reference", resolve_public_name)
     app.connect("doctree-resolved", set_numbers)
     app.connect("doctree-resolved", keep_intervals, priority=600)  # when the glued numbers are set
+    app.connect("doctree-resolved", keep_words)
     app.connect("builder-inited", copy_explorables)
     app.connect("env-get-outdated", read_again)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

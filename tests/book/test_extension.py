@@ -75,6 +75,21 @@ def test_an_interval_stays_on_its_line_and_a_list_of_code_is_left_alone(extensio
     assert [other.astext() for other in others] == ["[1, 2] at 12 %", "[1, 2][1, 2]"]
 
 
+def test_short_code_and_a_formula_with_its_word_stay_on_their_line(extension: ModuleType) -> None:
+    document = new_document("page")
+    short, long = nodes.literal("", "latent_to_value"), nodes.literal("", "torch.distributions.Distribution")
+    formula, lone = nodes.math("", "p"), nodes.math("", "p")
+    text = nodes.paragraph("", "", short, nodes.Text(" "), long, formula, nodes.Text("-values of "), lone)
+    document += text
+    extension.keep_words(None, document, "page")
+    assert (short["classes"], long["classes"]) == (["together"], [])
+    assert text.astext() == "latent_to_value torch.distributions.Distributionp-values of p"
+    (tied,) = text.findall(nodes.inline)
+    assert (tied["classes"], tied.astext()) == (["together"], "p-values")
+    assert [type(part).__name__ for part in tied] == ["math", "Text"]
+    assert text[-1] is lone
+
+
 @pytest.fixture(scope="module")
 def metadata() -> ModuleType:
     return load("metadata")

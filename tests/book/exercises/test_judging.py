@@ -30,6 +30,13 @@ def test_a_verdict_shows_itself() -> None:
     assert "a &lt; b" in verdict._repr_html_()
 
 
+@pytest.mark.parametrize(("book", "told"), [("1", "✓ passed, by the book"), ("0", "✓ passed<")])
+def test_a_page_says_whose_answer_has_passed(book: str, told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("INBOUNDS_BOOK_BUILD", book)
+    assert told in Judgement("f", True, "right")._repr_html_()
+    assert "by the book" not in Judgement("f", False, "wrong")._repr_html_()
+
+
 def test_a_diagnosis_that_is_no_name_is_judged_all_the_same() -> None:
     checks = {"sign": lambda f: "" if f(-1) < 0 else "it loses the sign"}
     found = judge_diagnosis({"A": ["sign"]}, {"A": abs}, checks, "function", "earlier", "later")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from inbounds.book.building import builds_the_book
 from inbounds.book.templates import macros
 
 
@@ -40,7 +41,8 @@ class Judgement:
 
     def _repr_html_(self) -> str:
         kind = {True: "tip", False: "warning", None: "note"}[self.passed]
-        return str(macros("judgement").box(kind, self.mark, self.exercise, self.message))
+        mark = f"{self.mark}, by the book's solution" if self.passed and builds_the_book() else self.mark
+        return str(macros("judgement").box(kind, mark, self.exercise, self.message))
 
 
 @dataclass(frozen=True)

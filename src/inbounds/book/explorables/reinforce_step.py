@@ -182,7 +182,7 @@ def reinforce_step(
         controls=(
             slider("draws", "draws in a batch", *_DRAWS, draws, 1, digits=0),
             slider("batch", "which batch", *_BATCH, batch, 1, digits=0),
-            slider("share", "baseline, share of the mean reward", *_SHARE, share, 0.1),
+            slider("share", "baseline / mean reward", *_SHARE, share, 0.1),
             slider("peak", "best latent", *_PEAK, peak, 0.1),
             slider("rate", "learning rate", *_RATE, rate, 0.05),
         ),

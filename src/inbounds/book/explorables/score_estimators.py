@@ -146,7 +146,7 @@ def score_estimators(
             slider("mu", "location μ", -2.4, 2.4, mu, 0.1),
             slider("log_sigma", "scale σ (logarithmic)", -2.3, 1.0, log_sigma, 0.1, log=True),
             slider("peak", "best action", -1.5, 1.5, peak, 0.1),
-            slider("share", "baseline, share of the mean reward", 0.0, 1.0, share, 0.1),
+            slider("share", "baseline / mean reward", 0.0, 1.0, share, 0.1),
         ),
         plots=tuple(
             _panel(key, label, height)
