@@ -167,7 +167,12 @@ def number_figures(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         elif FIGURE in node["classes"]:
             around, number = node.parent, next(numbers)
             place = around.index(node)
-            made = [raw(f'<figure class="{FIGURE}">'), node, raw(caption(number, node["alt"]) + "</figure>")]
+            narrow = f'<source srcset="{node["narrow"]}">' if node.get("narrow") else ""  # for `pictures`
+            made = [
+                raw(f'<figure class="{FIGURE}">{narrow}'),
+                node,
+                raw(caption(number, node["alt"]) + "</figure>"),
+            ]
             around.children[place : place + 1] = made
             for child in made:
                 child.parent = around

@@ -26,6 +26,11 @@ CARRIED = re.compile(
 )
 TAG = re.compile(r"<(?P<name>img|source)\b(?P<said>[^>]*?)(?P<end>\s*/?>)")
 ADDRESS = re.compile(r'\bsrc(?:set)?="(?P<address>[^":]+\.(?:png|jpg|svg))"')
+NARROW = re.compile(
+    r'(<figure class="inbounds-figure">)<source (srcset="[^"]*")>(.*?)(<img\b[^>]*>)', re.DOTALL
+)
+"""A figure that has another shape for a phone, as `layers` leaves it."""
+PHONE = "(max-width: 30rem)"  # as in book.css
 WIDTH = re.compile(r'\swidth="(?P<pixels>\d+)(px)?"')
 SIZES = re.compile(r"""\s(?P<side>width|height)=["'](?P<length>[\d.]+)(?P<unit>pt|px)?["']""")
 PIXELS = {"pt": 4 / 3, "px": 1.0, None: 1.0}  # in a unit of length
@@ -37,7 +42,8 @@ def bring_when_near(
     """Give a page's films and pictures files of their own, and its pictures a size."""
     if app.builder.format == "html" and context.get("body"):
         html = Path(app.outdir)
-        body = write_files(context["body"], html / FOLDER, context["pathto"](FOLDER, 1))
+        body = NARROW.sub(rf'\1\3<picture><source media="{PHONE}" \2>\4</picture>', context["body"])
+        body = write_files(body, html / FOLDER, context["pathto"](FOLDER, 1))
         # Sphinx copies a page's figures when all pages are written.
         later = {
             html / FOLDER / name: Path(app.srcdir, source) for source, name in app.builder.images.items()

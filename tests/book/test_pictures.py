@@ -77,6 +77,25 @@ def test_pictures_become_files_and_a_page_that_shows_one_twice_has_one(
     assert "loading" not in found.source.attrs
 
 
+def test_a_figure_has_another_shape_for_a_phone_and_a_link_to_the_wide_one(
+    pictures: ModuleType, html: Path
+) -> None:
+    fig = plt.figure(figsize=(4, 2))
+    link = '<a href="../_images/figure.png"><img src="../_images/figure.png" alt="A curve"></a>'
+    plain = f'<figure class="inbounds-figure">{link}<figcaption>1</figcaption></figure>'
+    both = plain.replace("<a ", f'<source srcset="{svg_uri(fig)}"><a ')
+    plt.close(fig)
+    found = page(pictures, html, both + plain)
+    first, second = found.find_all("figure")
+    assert first.a.picture.img["src"] == second.a.img["src"] == "../_images/figure.png"
+    assert first.source["media"] == "(max-width: 30rem)"
+    assert (html / "notebooks" / first.source["srcset"]).resolve().is_file()
+    assert (first.source["width"], first.source["height"]) == ("384", "192")
+    assert second.picture is None
+    style = (Path(pictures.__file__).parents[1] / "_static" / "book.css").read_text(encoding="utf8")
+    assert f"@media {pictures.PHONE}" in style
+
+
 def test_a_drawing_in_its_address_becomes_a_file(pictures: ModuleType, html: Path) -> None:
     fig, ax = plt.subplots(figsize=(4, 3))
     ax.set_title("50 % of “a & b” < 1 #")

@@ -112,7 +112,8 @@ def test_show_hands_over_image_and_alt_text(monkeypatch: pytest.MonkeyPatch) -> 
 def test_in_the_book_a_figure_is_a_drawing_unless_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("INBOUNDS_BOOK_BUILD", "1")
     data, metadata = shown(monkeypatch, "A line that falls from one to zero.")
-    assert metadata == {"image/svg+xml": {"alt": "A line that falls from one to zero.", "width": 300}}
+    expected = {"alt": "A line that falls from one to zero.", "width": 300, "narrow": ""}
+    assert metadata == {"image/svg+xml": expected}
     drawing = ElementTree.fromstring(data["image/svg+xml"])
     assert drawing.get("viewBox") == "0 0 216 144"  # points, 72 an inch
     monkeypatch.setattr(alt_text, "LONGEST_DRAWING", len(data["image/svg+xml"]) - 1)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from inbounds.book.building import builds_the_book
+from inbounds.book.drawing.narrow import rearrange
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,19 +96,28 @@ def last_picture(fig: Figure, alt: str, *, colors: int = 0) -> tuple[str, int]:
     """
     import matplotlib.pyplot as plt
 
+    _require_a_page(fig, alt)
+    drawn = png_bytes(fig)
+    png = base64.b64encode(_with_few_colors(drawn, colors) if colors else drawn).decode("ascii")
+    plt.close(fig)
+    return png, _pixels(fig)
+
+
+def _pixels(fig: Figure) -> int:
+    """Return a figure's width in CSS pixels."""
+    return round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
+
+
+def _require_a_page(fig: Figure, alt: str) -> None:
+    """Raise ValueError where a figure's alt text says too little, or, in the book's build, a label is cut off."""
     if len(alt.split()) < 4:
         raise ValueError(
             f"alt text {alt!r} is too short: say in a sentence what is plotted and what it shows"
         )
-    drawn = png_bytes(fig)
     if builds_the_book() and (cut := _cut_off(fig)):
         raise ValueError(
             f"cut off at the figure's edge: {'; '.join(cut)}. Shorten the text, or break its line"
         )
-    png = base64.b64encode(_with_few_colors(drawn, colors) if colors else drawn).decode("ascii")
-    width = round(fig.get_size_inches()[0] * PIXELS_PER_INCH)
-    plt.close(fig)
-    return png, width
 
 
 def _cut_off(fig: Figure) -> list[str]:
@@ -148,16 +158,28 @@ def show(fig: Figure, alt: str) -> None:
     from IPython.display import display
 
     alt = " ".join(alt.split())
-    drawing = short_svg(fig) if builds_the_book() else ""
-    picture, width = last_picture(fig, alt)
-    kind = "image/png"
-    if 0 < len(drawing) <= LONGEST_DRAWING:
-        kind, picture = "image/svg+xml", drawing
+    kind, picture, more = "image/png", "", {}
+    if builds_the_book():
+        _require_a_page(fig, alt)
+        picture, width = short_svg(fig), _pixels(fig)
+    if 0 < len(picture) <= LONGEST_DRAWING:
+        kind, more = "image/svg+xml", {"narrow": last_narrow(fig)}
+    else:
+        picture, width = last_picture(fig, alt)
     display(
         {kind: picture, "text/plain": f"Figure: {alt}"},
-        metadata={kind: {"alt": alt, "width": width}},
+        metadata={kind: {"alt": alt, "width": width, **more}},
         raw=True,
     )
+
+
+def last_narrow(fig: Figure) -> str:
+    """Close a figure, and return it in the shape of a phone, as the address of an SVG; "" where that has none."""
+    import matplotlib.pyplot as plt
+
+    address = svg_uri(fig) if rearrange(fig) else ""
+    plt.close(fig)
+    return address
 
 
 class AltTextRenderer:
@@ -178,5 +200,6 @@ class AltTextRenderer:
         rendered: list[Any] = renderer.render_image_inline(data) if inline else renderer.render_image(data)
         for node in rendered:
             node["alt"] = alt
+            node["narrow"] = data.output_metadata[data.mime_type].get("narrow", "")
             node["classes"].append("inbounds-figure")  # book/_ext/layers.py numbers these
         return rendered
