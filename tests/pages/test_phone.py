@@ -56,23 +56,35 @@ SHOWN = """async (node) => {
 NARROW = "source => new URL(source.getAttribute('srcset'), location).href"
 
 
-@pytest.mark.parametrize("name", ["notebooks/what_happened.html", "notebooks/figures_of_the_thesis.html"])
-def test_six_robots_stand_in_one_column_that_fits(page: Page, address: str, name: str) -> None:
-    page = on_a_phone(page, address + name)
-    pictures = page.locator(".inbounds-study picture")
-    assert pictures.count() >= 3
+@pytest.mark.parametrize(
+    ("name", "within", "at_least"),
+    [
+        ("what_happened", ".inbounds-study", 3),
+        ("figures_of_the_thesis", ".inbounds-study", 3),
+        ("front_page", "figure.inbounds-figure", 1),
+        ("ppo", "figure.inbounds-figure", 4),
+        ("many_steps_from_one_batch", "figure.inbounds-figure", 2),
+    ],
+)
+def test_six_robots_stand_in_one_column_that_fits_and_so_do_the_panels_of_a_chapter(
+    page: Page, address: str, name: str, within: str, at_least: int
+) -> None:
+    page = on_a_phone(page, f"{address}notebooks/{name}.html")
+    pictures = page.locator(f"{within} picture")
+    assert pictures.count() >= at_least
     for picture in pictures.all():
         image = picture.locator("img")
         image.scroll_into_view_if_needed()
         assert image.evaluate(SHOWN) == picture.locator("source").evaluate(NARROW)
         assert picture.evaluate(
-            "node => node.closest('figure').scrollWidth <= node.closest('figure').clientWidth"
+            "node => ['figure', 'a, figure'].map((each) => node.closest(each))"
+            ".every((around) => around.scrollWidth <= around.clientWidth)"
         )
         box = image.bounding_box()
         assert box is not None
         assert 250 < box["width"] <= book.PHONE["width"]
     page.set_viewport_size(book.DESKTOP)
-    first = page.locator(".inbounds-study picture").first
+    first = pictures.first
     first.scroll_into_view_if_needed()
     wide = first.locator("img").evaluate("node => new URL(node.getAttribute('src'), location).href")
     image = first.locator("img").element_handle()
