@@ -246,6 +246,8 @@ def keep_intervals(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         # A glued number before it is a node of its own.
         glued = text.startswith(" %") and follows_number(text)
         kept = together(f"0{text.astext()}")[1:] if glued else together(text.astext())
+        if text == ", " and between_ends(text):
+            kept = ",\N{NO-BREAK SPACE}"
         if kept != text.astext():
             text.parent.replace(text, nodes.Text(kept))
 
@@ -268,6 +270,18 @@ def keep_words(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         if isinstance(after, nodes.Text) and (tied := re.match(r"-\w+", after)):
             both = nodes.inline("", "", math.deepcopy(), nodes.Text(tied[0]), classes=["together"])
             math.parent[place : place + 2] = [both, nodes.Text(after[tied.end() :])]
+
+
+def between_ends(text: nodes.Text) -> bool:
+    """Whether a text stands between the two ends of an interval that a notebook has glued into the sentence."""
+    around = text.parent.children
+    place = text.parent.index(text)
+    if not 1 < place < len(around) - 2:
+        return False
+    opening, low, _, high, closing = around[place - 2 : place + 3]
+    ends = [low, high]
+    glued = all(isinstance(end, nodes.Element) and "pasted-text" in end["classes"] for end in ends)
+    return glued and opening.astext().endswith("[") and closing.astext().startswith("]")
 
 
 # "auto" shows the logo of either theme until the theme's script has run, and then the page moves.

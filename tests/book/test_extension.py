@@ -68,7 +68,13 @@ def test_an_interval_stays_on_its_line_and_a_list_of_code_is_left_alone(extensio
     document += nodes.paragraph("", "", nodes.Text("by "), glued, nodes.Text(" % or so"))
     document += nodes.literal_block("", "[1, 2] at 12 %")
     document += nodes.paragraph("", "", nodes.literal("", "[1, 2]"), nodes.math("", "[1, 2]"))
+    ends = [nodes.inline("", end, classes=["pasted-text"]) for end in ("1", "2", "3")]
+    parts = ["of [", ends[0], ", ", ends[1], "], and ", ends[2], ", too"]
+    last = nodes.paragraph("", "", *(nodes.Text(part) if isinstance(part, str) else part for part in parts))
+    document += last
     extension.keep_intervals(None, document, "page")
+    assert last.astext() == "of [1,\u00a02], and 3, too"
+    document.remove(last)
     first, second, *others = document
     assert second.astext() == "by 40\u00a0% or so"
     assert first.astext() == "12\u00a0% more [−1571,\u00a01\u202f058], of [3, 4, 5]"
