@@ -154,6 +154,15 @@ def test_a_missing_encoder(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "✗ films: no encoder videos need mediapy: pip install '.[video]'" in out
 
 
+def test_without_the_book_an_encoder_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mediapy", None)
+    absent = doctor.Diagnosis("packages (book)", "optional", "not installed")
+    monkeypatch.setattr(doctor, "look_at_packages", lambda extra: absent)
+    code, out = only(monkeypatch, doctor.look_at_films)
+    assert code == 0
+    assert "– films: no encoder" in out
+
+
 def test_one_thing_that_cannot_be_looked_at_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     def look_at_nothing() -> doctor.Diagnosis:
         raise OSError("no such thing")

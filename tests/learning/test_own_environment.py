@@ -18,6 +18,7 @@ from inbounds.learning import (
     TrainConfig,
     Trainer,
     executed_std,
+    preset,
     read_curves,
     save_run,
     train,
@@ -133,3 +134,14 @@ def test_a_seed_that_a_run_does_not_have_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"the run has the seeds \[0, 1, 2\], not \[7\]"):
         save_policies(tmp_path / "policies", Trainer(small_config(), PointEnv), seeds=[7])
     assert not list(tmp_path.iterdir())
+
+
+def test_who_forgets_to_pass_the_environment_is_told_to() -> None:
+    with pytest.raises(gymnasium.error.Error) as caught:
+        train(preset("common", "greenhouse", seeds=1, epochs=1))
+    assert any("pass make_envs= beside 'greenhouse'" in note for note in caught.value.__notes__)
+
+
+def test_a_robot_without_its_version_is_not_taken_for_gymnasiums() -> None:
+    with pytest.raises(ValueError, match="HalfCheetah names no version: ask for HalfCheetah-v5"):
+        train(preset("common", "HalfCheetah", seeds=1, epochs=1))

@@ -234,8 +234,6 @@ class _Session:
 def _check_environment(config: TrainConfig) -> bool:
     """Return whether the environment can save its state; raise unless it can be made, and say what to ask for."""
     tasks = f"The tasks are {', '.join(TASK_NAMES)}"
-    if (versioned := f"{config.env.removeprefix('inbounds/')}-v5") in TASK_NAMES:
-        raise CommandError(f"{config.env} names no version: ask for {versioned}", 2)
     try:
         if module_of(config.env) is not None:
             if len(parts := config.env.split(":")) != 2 or not all(parts):

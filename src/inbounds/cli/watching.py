@@ -58,7 +58,10 @@ def run(command: Watch) -> int:
     except BackendError:
         raise
     except (gymnasium.error.Error, ImportError) as error:
-        raise CommandError(f"{policy.config.env} cannot be made here: {error}") from error
+        raise CommandError(
+            f"{policy.config.env} cannot be made here: {str(error).rstrip('.')}. Train it as module:id, or let the "
+            "policy act in an environment of yours: load_policy(run).act(obs)"
+        ) from error
     except MemoryError as error:
         fewer = "choose fewer --seconds, or a smaller --width and --height"
         raise CommandError(f"there is no memory for such a film: {fewer}") from error
@@ -72,7 +75,8 @@ def run(command: Watch) -> int:
         raise CommandError(str(error)) from error
     except OSError as error:
         room = " Free some space on the disk and repeat the command." if is_disk_full(error) else ""
-        raise CommandError(f"{path} could not be written: {error.strerror or error}.{room}") from error
+        other = room or " Choose another --out."
+        raise CommandError(f"{path} could not be written: {error.strerror or error}.{other}") from error
     print(f"{policy.config.env}, {policy.config.policy.family}, seed {policy.seed}, acting by {greedy}")
     over = ", ".join(map(format_return, envs.return_queue))
     count = len(envs.return_queue)

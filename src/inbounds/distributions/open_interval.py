@@ -57,13 +57,14 @@ def open_ends(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
     return smallest, largest
 
 
-def from_line(latent: Tensor, low: Tensor, high: Tensor) -> Tensor:
+def from_line(latent: Tensor, low: Tensor, high: Tensor, ends: tuple[Tensor, Tensor] | None = None) -> Tensor:
     """Return low + (high − low) · sigmoid(latent), strictly inside the bounds for every latent (±inf included).
 
     Args:
         latent: `[...]` numbers, broadcast against the bounds.
         low: `[...]` lower bounds.
         high: `[...]` upper bounds.
+        ends: `open_ends(low, high)`, where they are known; they are none of ONNX's operators.
 
     Returns:
         `[...]` values; each is measured from the bound that it is closer to.
@@ -75,8 +76,7 @@ def from_line(latent: Tensor, low: Tensor, high: Tensor) -> Tensor:
     width = high - low
     fraction, complement = torch.sigmoid(latent), torch.sigmoid(-latent)
     value = torch.where(fraction < 0.5, low + width * fraction, high - width * complement)
-    smallest, largest = open_ends(low, high)
-    return torch.clamp(value, smallest, largest)
+    return torch.clamp(value, *(ends or open_ends(low, high)))
 
 
 def to_line(value: Tensor, low: Tensor, high: Tensor) -> Tensor:

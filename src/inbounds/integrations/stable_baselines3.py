@@ -23,6 +23,7 @@ from torch import Tensor, nn
 from inbounds.distributions import ClippedNormal, LogitNormal
 from inbounds.distributions.bounds import require_bounds
 from inbounds.distributions.boxes import require_box
+from inbounds.distributions.open_interval import from_line, open_ends
 from inbounds.integrations.quiet import quiet_scale
 
 try:
@@ -185,14 +186,15 @@ class LogitNormalPolicy(ActorCriticPolicy):
 class LogitNormalActor(nn.Module):
     """What a `LogitNormalPolicy` does on a robot: observations `[B, O]` to the medians `[B, A]` of its actions.
 
-    A module for `torch.export`, without the peer, its critic and its noise; called itself, the policy returns latents.
+    A module for `torch.export` and `torch.onnx.export`, without the peer, its critic and its noise; called itself, the
+    policy returns latents.
 
     Args:
         policy: a trained one. Its layers are shared, not copied.
 
-    The observations are what the policy's network sees: floating point, pictures channels first and divided by 255,
-    and where the peer normalised them (`VecNormalize`), normalised by the same numbers, which are to be kept with the
-    module.
+    The observations are what the policy's network sees: of its type (float32, where nothing else was asked for),
+    pictures channels first and divided by 255, and where the peer normalised them (`VecNormalize`), normalised by the
+    same numbers, which are to be kept with the module.
 
     Raises:
         ValueError: another policy.
@@ -201,8 +203,10 @@ class LogitNormalActor(nn.Module):
         >>> from stable_baselines3 import PPO
         >>> model = PPO(LogitNormalPolicy, "Pendulum-v1", n_steps=64, device="cpu", seed=0)
         >>> actor, obs = LogitNormalActor(model.policy), torch.randn(5, 3)
-        >>> deployed = torch.export.export(actor, (obs,)).module()
-        >>> bool((deployed(obs).detach().numpy() == model.predict(obs.numpy(), deterministic=True)[0]).all())
+        >>> batch = {0: torch.export.Dim("batch", min=1, max=1024)}  # else five at a time, for ever
+        >>> deployed = torch.export.export(actor, (obs,), dynamic_shapes=(batch,)).module()
+        >>> one = obs[:1]
+        >>> bool((deployed(one).detach().numpy() == model.predict(one.numpy(), deterministic=True)[0]).all())
         True
     """
 
@@ -218,15 +222,19 @@ class LogitNormalActor(nn.Module):
             policy.action_net,
         )
         low, high = policy._limits(next(policy.action_net.parameters()))
-        self.register_buffer("low", low)
-        self.register_buffer("high", high)
+        smallest, largest = open_ends(low, high)
+        bounds = {"low": low, "high": high, "smallest": smallest, "largest": largest}
+        for name, bound in bounds.items():
+            self.register_buffer(name, bound)
         self.low: Tensor
         self.high: Tensor
+        self.smallest: Tensor
+        self.largest: Tensor
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the medians `[B, A]`, strictly inside the box."""
         latent = self.head(self.think.forward_actor(self.see(obs)))
-        return _law(latent, self.low, self.high).latent_to_value(latent)
+        return from_line(latent, self.low, self.high, (self.smallest, self.largest))
 
 
 def _law(like: Tensor, low: Tensor, high: Tensor) -> LogitNormal:

@@ -336,10 +336,23 @@ def make_environments(config: TrainConfig, num_envs: int) -> Environments:
 
     Returns:
         A vector environment that resets in the step that ends an episode.
+
+    Raises:
+        ValueError: one of our robots without its version, which Gymnasium would take for another.
+        gymnasium.error.Error: Gymnasium cannot make it; a note says what else to pass.
     """
     if config.env.removeprefix("inbounds/") in TASK_NAMES:
         return robots.make(config.env, num_envs, action_mode=config.action_mode)
+    if (versioned := f"{config.env.removeprefix('inbounds/')}-v5") in TASK_NAMES:
+        raise ValueError(f"{config.env} names no version: ask for {versioned}")
     with naming_the_backend():  # Gymnasium has robots, too
-        return SyncVectorEnv(
-            [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
-        )
+        try:
+            return SyncVectorEnv(
+                [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
+            )
+        except gymnasium.error.Error as error:
+            error.add_note(
+                f"For an environment of your own that is not registered, pass make_envs= beside {config.env!r}, on "
+                "resuming, too; for one in a module, ask for module:id."
+            )
+            raise

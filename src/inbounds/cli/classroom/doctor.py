@@ -124,13 +124,16 @@ def look_at_drawing() -> Diagnosis:
 
 
 def look_at_films() -> Diagnosis:
-    """Look for the encoder."""
+    """Look for the encoder, which the book needs, and the package alone for `inbounds watch`."""
     from inbounds.book.drawing.videos import require_encoder
 
     try:
         require_encoder()
     except RuntimeError as error:
-        return Diagnosis("films", "missing", "no encoder", str(error))
+        needed: Literal["optional", "missing"] = (
+            "missing" if look_at_packages("book").state == "fine" else "optional"
+        )
+        return Diagnosis("films", needed, "no encoder", str(error))
     return Diagnosis("films", "fine", "an ffmpeg is there")
 
 

@@ -72,7 +72,8 @@ def find(run: str | Path, name: str) -> Path:
         if path.with_name("checkpoint.pt").is_file():
             raise FileNotFoundError(
                 f"there is no {path}, but a checkpoint beside it: save_run(run_dir, train(config, run_dir=run_dir)) of "
-                "inbounds.learning goes on from that and writes it; so does the `inbounds train` command of the run"
+                "inbounds.learning (with make_envs, where the run had one) goes on from that and writes it; so does "
+                "the `inbounds train` command of the run"
             )
         raise FileNotFoundError(f"there is no {path}: train a run first (inbounds train --out {out})")
     return path
@@ -91,8 +92,8 @@ def damaged(path: Path, reason: object, remedy: str = "") -> DamagedFileError:
         curves.parquet is damaged, cut short or of another origin (no footer): train again
     """
     remedy = remedy or (
-        "repeat the `inbounds train` command of this run, which writes it anew from the checkpoint beside it, "
-        "or put a copy in its place"
+        "repeat the `inbounds train` command of this run, or save_run(run_dir, train(config, run_dir=run_dir)) of "
+        "inbounds.learning, which write it anew from the checkpoint beside it, or put a copy in its place"
     )
     said = (str(reason) or type(reason).__name__).splitlines()[0].rstrip(".")
     return DamagedFileError(f"{path} is damaged, cut short or of another origin ({said[:120]}): {remedy}")
