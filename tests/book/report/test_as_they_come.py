@@ -41,7 +41,7 @@ def test_found_fragile_changed(compared: views.Compared, found: bool, fragile: b
 def test_words() -> None:
     hopper = dataclasses.replace(row(over_all=0.2), robot="Hopper")
     assert views.told([row(), hopper, row(gap(-1, 9))]) == (
-        "above on 2 of 3 robots (Ant, Hopper†), below on none, no difference found on 1"
+        "above on 2 of 3 robots (Ant, Hopper†), no difference found on 1"
     )
     assert views.changed_words([row(gap(-1, 9))]) == [
         "PPO, standard practice, Beta − Gaussian, Ant, final return: higher → unresolved"

@@ -83,6 +83,22 @@ def test_each_difference_is_told_with_its_grade() -> None:
     assert [bar.group for bar in answers.bars(rows) if not bar.hollow] == ["Hopper", "HalfCheetah"]
 
 
+def test_a_row_of_the_table_says_on_which_side_of_zero_a_difference_is() -> None:
+    rows = [
+        SECOND_ONE,
+        dataclasses.replace(SECOND_ONE, robot="Swimmer", whole=False, difference=gap(-900, -300)),
+        dataclasses.replace(SECOND_ONE, robot="Ant", difference=gap(10, 90)),
+    ]
+    assert [answers._told(each) for each in rows] == [
+        "above, found",
+        "below, suggested",
+        "too small to matter",
+    ]
+    table = answers.by_endpoint(rows, SECOND_ONE.algorithm).html.partition("<tbody>")[2]
+    assert '<th scope="row" class="words">Swimmer</th>' in table
+    assert "<br>below, suggested</td>" in table
+
+
 def test_a_hollow_marker_is_the_first_study_where_there_are_both() -> None:
     rows = [
         SECOND_ONE,

@@ -8,6 +8,8 @@ import pytest
 
 from inbounds.book.report.forests import MARGINS_AS_UNIT, SERIES, Bar, forest, in_words
 from inbounds.book.report.study_panels import NARROW
+from inbounds.study.analysis import CONTRASTS
+from inbounds.study.grid import ARMS
 from tests.book.report.made_up import gap
 
 
@@ -70,8 +72,12 @@ def test_a_hollow_bar_is_hollow() -> None:
     assert [line.get_markerfacecolor() for line in markers] == [SERIES["beta"].color, "white"]
 
 
-def test_no_two_series_look_alike() -> None:
-    assert len({(series.color, series.marker) for series in SERIES.values()}) == len(SERIES)
+def test_no_two_series_of_a_figure_look_alike() -> None:
+    shown = {name: each for name, each in SERIES.items() if name != "logit-normal, clipped-gaussian"}
+    assert len({(series.color, series.marker) for series in shown.values()}) == len(shown)
+    for arm in ARMS:
+        pairs = {(c.first, c.second) for c in CONTRASTS if c.arm == arm}
+        assert not {("logit-normal", "gaussian"), ("logit-normal", "clipped-gaussian")} <= pairs
 
 
 def test_nothing_to_draw() -> None:

@@ -138,9 +138,9 @@ def listed_in(text: str) -> dict[str, list[str]]:
     """The robots by what a page's words say of them; where it names none, as many empty names as it counts."""
     words = "suggested above|suggested below|above|below|too small to matter|no difference found"
     found = re.findall(rf"({words}) on (\w+)(?: of (\d+) robots?)?(?: \(([^)]*)\))?", text)
-    listed = {}
+    listed: dict[str, list[str]] = {"above": [], "below": []}  # which a page leaves out where there are none
     for word, count, _, robots in found:
-        number = 0 if count == "none" else int(count)
+        number = int(count)
         listed[word] = robots.split(", ") if robots else [""] * number
         assert len(listed[word]) == number, text
     assert int(found[0][2]) == sum(map(len, listed.values())), text

@@ -55,6 +55,34 @@ def test_the_primary_table(outcomes: Outcomes) -> None:
     assert by["Walker2d", "Beta", "final return"][4] == "missing"
 
 
+def test_the_primary_forest_says_what_is_filled_and_what_waits(outcomes: Outcomes) -> None:
+    found = outcomes.and_of(second_cells())
+    rows = [row for row in second.primary(found) if row.difference is not None]
+    bars = [bar for panel in views._bars(rows).values() for bar in panel]
+    by_panel = sorted(rows, key=lambda row: list(views.ENDPOINTS).index(row.endpoint))
+    assert [bar.hollow for bar in bars] == [
+        row.finding not in ("confirmed", "contradicted") for row in by_panel
+    ]
+    caption = (
+        views.primary_comparison(outcomes).html.partition("<figcaption>")[2].partition("</figcaption>")[0]
+    )
+    assert "Filled: found" in caption
+    assert caption.endswith("Seeds are still to be run: Swimmer.")
+    assert "still to be run" not in views._caption([row for row in rows if row.whole])
+
+
+def test_a_pair_that_differs_in_its_start_says_so() -> None:
+    named = {secondary_tests._named(pair) for pair in second.PAIRS["a quiet start"]}
+    assert named == {
+        "PPO: Gaussian free σ, quiet start − Gaussian free σ, start at σ = 1",
+        "PPO: Gaussian σ(s), quiet start − Gaussian free σ, start at σ = 1",
+    }
+    for pairs in second.PAIRS.values():
+        for pair in pairs:
+            first, _, other = secondary_tests._named(pair).partition(": ")[2].partition(" − ")
+            assert first != other
+
+
 def test_every_cell_is_told_with_its_greedy_return(outcomes: Outcomes) -> None:
     _, *rows = rows_of(views.cells(outcomes))
     assert len(rows) == 3 * 5 + 2 * 3

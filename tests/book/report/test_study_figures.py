@@ -152,8 +152,33 @@ def test_differences_stand_beside_zero_with_their_corrected_p_value() -> None:
     assert first.texts[0].get_text() == "p < 0.001"
     assert second.texts[0].get_text() == "missing"
     assert first.get_yticklabels()[0].get_text() == "Beta\n− Gaussian"
+    assert first.lines[1].get_markerfacecolor() == LOOKS["beta"].color
+    assert "Filled: the interval leaves out 0, and the test finds the difference. Hollow: not." in words(fig)
     assert "difference of IQMs" in words(fig)
     assert "after Holm's correction" in words(fig)
+
+
+def test_what_stands_beside_a_row_lies_outside_its_panel_and_what_is_not_found_is_hollow() -> None:
+    gap = statistics.difference(scores(2), scores(0), np.random.default_rng(0))
+    pairs = {
+        ("beta", "gaussian"): statistics.Comparison(gap, 0.03, 0.18),
+        ("logit-normal", "gaussian"): statistics.Comparison(None, np.nan, np.nan),
+    }
+    (ax,) = study_figures.difference_panels({"Ant": pairs}, noted=False).axes
+    ax.figure.draw_without_rendering()
+    assert [text.get_text() for text in ax.texts] == ["p = 0.180", "missing"]
+    assert all(text.get_window_extent().x0 > ax.bbox.x1 for text in ax.texts)
+    assert ax.lines[1].get_markerfacecolor() == "white"
+
+
+def test_a_note_is_below_the_panels_or_in_a_caption() -> None:
+    bars = {"Ant": {"beta": estimate(scores(0))}}
+    note = " ".join(study_figures.interval_note(bars).split())
+    assert note == "Marker: IQM. Bar: 95 % bootstrap interval. n = 10 seeds."
+    for noted in (True, False):
+        assert (note in words(study_figures.interval_panels(bars, noted=noted))) is noted
+    lost = {"Ant": {"beta": estimate([np.nan, *scores(0)[1:]], missing="exclude")}}
+    assert study_figures.interval_note(lost).endswith("Hollow: seeds are left out.")
 
 
 @pytest.mark.parametrize("narrow", [False, True])

@@ -19,7 +19,7 @@ from inbounds.book.report.words import pair_name
 from inbounds.study import analysis, select
 from inbounds.study.analysis import CONTRASTS, Contrast
 from inbounds.study.grid import ROBOTS
-from inbounds.study.ledger import CLAIMS, claims_named, computed, judge, quotes
+from inbounds.study.ledger import CLAIMS, Finding, claims_named, computed, judge, quotes
 from inbounds.study.outcomes import Outcomes
 from inbounds.study.words import spoken, verdict
 from tests.study.small import folder_in
@@ -169,7 +169,9 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
     rows = cells(study_pages.ledger(found))
     assert [row[1].partition("\n")[0] for row in rows] == [quotes.verdict(each).upper() for each in found]
     assert rows[-1][1].startswith("NOT TESTED\nJudged anew: ")
-    (wins,) = [row for row in rows if row[0].endswith("\ninbounds study ledger wins-ppo-standard")]
+    (wins,) = [
+        row for row in rows if row[0].endswith("\n<code>inbounds study ledger wins-ppo-standard</code>")
+    ]
     assert wins[0].startswith("“In the four environments both in PPO and TRPO")
     _, _, behind, _, hopper, ant, missing = wins[1].split("\n")
     assert behind == "cells: 4 of 12; listed in the protocol"
@@ -186,10 +188,12 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
     assert "Refuted: " in study_pages.decided(found).html
 
 
-def test_the_caption_says_what_a_time_is_repeated_over() -> None:
-    claims_named(["fisher-time"])
+def test_the_caption_says_what_a_time_is_repeated_over_where_a_row_has_one(nothing: Outcomes) -> None:
+    (timed,) = claims_named([ledger_table.TIMED])
     assert computed._REPEATS == 10
-    assert "intervals over seeds, of fisher-time over ten repeats;" in study_pages.ledger([]).html
+    row = Finding(timed, (), 0, 0)
+    assert "intervals over seeds, of fisher-time over ten repeats;" in study_pages.ledger([row]).html
+    assert "intervals over seeds;" in study_pages.ledger([]).html
 
 
 def test_the_middle_seed_is_in_the_middle(some: Outcomes) -> None:

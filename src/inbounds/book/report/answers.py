@@ -222,14 +222,20 @@ def _numbers(rows: Sequence[Evidence], algorithm: str) -> str:
     def told(robot: str, endpoint: str, law: str) -> str:
         found = of(rows, robot=robot, endpoint=endpoint, law=law)
         numbers = [spoken(row.difference).replace(" ", "\N{NO-BREAK SPACE}") for row in found]
-        return "\n".join(f"{n}\n{grade(row)}" for n, row in zip(numbers, found, strict=True)) or "not run"
+        return "\n".join(f"{n}\n{_told(row)}" for n, row in zip(numbers, found, strict=True)) or "not run"
 
     caption = (
         f"{algorithm.upper()}, minus a Gaussian that starts equally quiet: difference of means with its 95 % interval, "
         "and how well it is founded. An interval that ends within a hundredth of its width of 0 counts as holding it."
     )
-    table = [[f"{robot}, {algorithm.upper()}", *(told(robot, *each) for each in columns)] for robot in ROBOTS]
+    table = [[robot, *(told(robot, *each) for each in columns)] for robot in ROBOTS]
     return html.table(caption, head, table, anchors=[place_of(robot, algorithm) for robot in ROBOTS])
+
+
+def _told(row: Evidence) -> str:
+    """Return on which side of 0 a difference lies, and how well that is founded."""
+    way = sign(row)
+    return f"{'above' if way > 0 else 'below'}, {grade(row)}" if way else grade(row)
 
 
 def quiet_gains(rows: Sequence[Evidence], algorithm: str) -> Shown:

@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
-from inbounds.book.report.study_figures import Curve, difference_panels, interval_panels, learning_curves
+from inbounds.book.report.study_figures import (
+    Curve,
+    curve_note,
+    difference_note,
+    difference_panels,
+    interval_note,
+    interval_panels,
+    learning_curves,
+)
 from inbounds.book.report.words import ARM_NAMES, HEADS, in_words, pair_name, title_of
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, Contrast
@@ -91,8 +99,9 @@ def curves(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         f"Mean final returns: {in_words(_finals(part))}"
     )
     caption = (
-        "Mean undiscounted return of the episodes that ended in an epoch, over seeds; the axis counts the env steps "
-        "of one seed, of which ten train. Each robot has its own scale."
+        f"Learning curves ({part.title}): mean undiscounted return of the episodes that ended in an epoch, over seeds; "
+        "the axis counts the env steps of one seed, of which ten train. Each robot has its own scale. "
+        f"{curve_note(panels)}"
     )
     counts = {robot: (sum(map(bool, row.values())), len(row)) for robot, row in part.cells.items()}
     unfinished = any(done < planned for done, planned in counts.values())
@@ -101,7 +110,7 @@ def curves(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
 
 
 def _curves_of(panels: Mapping[str, Mapping[str, Curve | None]], narrow: bool) -> Figure:
-    return learning_curves(panels, ylabel="return of training episodes", narrow=narrow)
+    return learning_curves(panels, ylabel="return of training episodes", narrow=narrow, noted=False)
 
 
 def _finals(part: Part) -> dict[str, dict[str, Estimate | None]]:
@@ -119,10 +128,13 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
     finals = _finals(part)
 
     def draw(narrow: bool) -> Figure:
-        label = "final return: mean of training returns over the last 10 % of epochs"
-        return interval_panels(finals, xlabel=label, narrow=narrow)
+        return interval_panels(finals, xlabel="final return", narrow=narrow, noted=False)
 
     alt = f"Final returns ({part.title}) with intervals, a panel per robot: {in_words(finals)}"
+    drawn = (
+        f"Final returns ({part.title}), a panel per robot: training returns of the last 10 % of epochs. "
+        f"{interval_note(finals)}"
+    )
     measures = [f"{name}, {statistic}" for name in HEADS.values() for statistic in ("mean", "IQM")]
     head = ["robot", "family", *measures, "seeds", "diverged"]
     rows = []
@@ -138,7 +150,8 @@ def endpoints(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         f"Endpoints ({part.title}): over ten seeds, in brackets a {percent(LEVEL)} bootstrap interval."
         f"{_unfinished(part.begun)}"
     )
-    return part.shown("endpoints", html.figure_of(draw, alt), html.table(caption, head, rows, words=(0, 1)))
+    table = html.table(caption, head, rows, words=(0, 1))
+    return part.shown("endpoints", html.figure_of(draw, alt, drawn), table)
 
 
 def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
@@ -156,14 +169,18 @@ def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         finals = {robot: {(c.first, c.second): found[c][0][robot] for c in contrasts} for robot in known}
 
         def draw(narrow: bool) -> Figure:
-            return difference_panels(finals, xlabel="difference of mean final returns", narrow=narrow)
+            label = "difference of mean final returns"
+            return difference_panels(finals, xlabel=label, narrow=narrow, noted=False)
 
         alt = f"Differences of mean final returns ({part.title}), a panel per robot: " + ". ".join(
             f"{pair_name(c)} on {robot}: {spoken(found[c][0][robot].difference)}"
             for c in contrasts
             for robot in known
         )
-        parts = [html.figure_of(draw, alt), *parts]
+        caption = (
+            f"Differences of mean final returns ({part.title}), a panel per robot. {difference_note(finals)}"
+        )
+        parts = [html.figure_of(draw, alt, caption), *parts]
     gone = sum(int(outcome.diverged.sum()) for _, _, outcome in part.finished())
     if not gone:
         said = html.paragraph("No seed diverged here: without such seeds every number is the same.")

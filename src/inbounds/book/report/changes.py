@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.html import NONE_FINISHED, Shown
-from inbounds.book.report.study_figures import interval_panels
+from inbounds.book.report.study_figures import interval_note, interval_panels
 from inbounds.book.report.words import HEADS, change_name
 from inbounds.study import analysis
 from inbounds.study.analysis import ENDPOINTS
@@ -75,7 +75,8 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
     }
 
     def draw(narrow: bool) -> Figure:
-        return interval_panels(panels, xlabel="change of the mean final return", reference=0.0, narrow=narrow)
+        label = "change of the mean final return"
+        return interval_panels(panels, xlabel=label, reference=0.0, narrow=narrow, noted=False)
 
     alt = f"{title}: change of the mean final return against the cell of comparison. " + ". ".join(
         f"{panel}: " + ", ".join(f"{LOOKS[f].label} {spoken(e)}" for f, e in row.items())
@@ -96,7 +97,8 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
     ]
     head = [*first, *HEADS.values(), *last]
     words = [i for i, name in enumerate(head) if name in told]
-    parts = [html.figure_of(draw, alt), html.table(caption, head, table, words)]
+    below = f"{where}: change of the mean final return, changed cell minus cell of comparison. {interval_note(panels)}"
+    parts = [html.figure_of(draw, alt, below), html.table(caption, head, table, words)]
     if any(done < planned for done, planned in counts.values()):
         parts.append(html.progress(_without_shared(counts)))
     return parts

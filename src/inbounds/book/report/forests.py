@@ -58,7 +58,9 @@ SERIES: Mapping[str, Series] = MappingProxyType(
             "Gaussian, quiet − usual start", LOOKS["gaussian"].color, LOOKS["gaussian"].marker
         ),
         "logit-normal, beta": Series("Logit-normal − Beta", SHADES[2], "v"),
-        "logit-normal, clipped-gaussian": Series("Logit-normal − CAPG", SHADES[1], "P"),
+        "logit-normal, clipped-gaussian": Series(  # in no figure beside the logit-normal minus Gaussian
+            "Logit-normal − CAPG", LOOKS["logit-normal"].color, LOOKS["logit-normal"].marker
+        ),
         "usual starts": Series("usual starts", SHADES[0], "s"),
         "both quiet": Series("both quiet", SHADES[3], "X"),
         "both loud": Series("both loud", SHADES[1], "D"),

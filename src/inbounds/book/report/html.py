@@ -162,6 +162,19 @@ def table(
     return str(_HTML.table(together(caption), head, kept, words, anchors))
 
 
+def with_code(text: str) -> str:
+    """Let words between backticks stand in the typewriter's face.
+
+    Args:
+        text: HTML.
+
+    Example:
+        >>> with_code("run `make`")
+        'run <code>make</code>'
+    """
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", text)
+
+
 def links(caption: str, columns: Sequence[str], fields: Mapping[str, Mapping[str, tuple[str, str]]]) -> str:
     """Return a table whose fields are links.
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
+from inbounds.book.report.study_figures import SHORT
+from inbounds.book.report.words import change_name
+from inbounds.study.cell import VARIANTS
 from inbounds.study.ledger import CLAIMS, Finding, judge
 from inbounds.study.ledger.quotes import judged_anew, quote, thesis_and_book, verdict
 from inbounds.study.ledger.verdicts import STAYS
@@ -15,11 +19,12 @@ from inbounds.study.statistics.settings import LEVEL
 from inbounds.study.words import percent
 
 HEAD = ("claim", "verdict, test and result")
-_CAPTION = (
-    f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds, of "
-    "fisher-time over ten repeats; p of a permutation test, corrected over the six robots (Holm). Open: the interval "
-    "leaves both possible, or, not after Holm, the test does not find what it shows. Moot: there is nothing to "
-    "explain. Exploratory: the protocol does not list such a number. Stays undecided: no missing cell can decide it."
+TIMED = "fisher-time"
+"""The claim whose intervals are over repeats of a measurement, not over seeds."""
+_NAMES: Mapping[str, str] = {**SHORT, **{name: change_name(name) for name in VARIANTS if name}}
+"""Family or variant → what the table calls it."""
+_NAMED = re.compile(
+    rf"(?<![\w-])({'|'.join(map(re.escape, sorted(_NAMES, key=len, reverse=True)))})(?![\w-])"
 )
 
 
@@ -36,13 +41,13 @@ def ledger(found: Sequence[Finding]) -> Shown:
     """
     rows = [
         [
-            f"{_words(each)}{each.claim.says}\n({each.claim.where})\n{each.claim.command}",
+            f"{_words(each)}{each.claim.says}\n({each.claim.where})\n`{each.claim.command}`",
             f"{verdict(each).upper()}\n{_why_not(each)}{each.counted}\ncells: {each.cells}; {each.claim.standing}\n"
-            f"Test: {each.claim.test}\n{each.told}",
+            f"Test: {each.claim.test}\n{in_words(each.told)}",
         ]
         for each in found
     ]
-    claims = html.table(_CAPTION, HEAD, rows, words=range(len(HEAD)))
+    claims = html.with_code(html.table(_caption(found), HEAD, rows, words=range(len(HEAD))))
     thesis, book = thesis_and_book(found)
     tallies = [
         html.paragraph(f"{whose}: {counted(part)}")
@@ -50,6 +55,27 @@ def ledger(found: Sequence[Finding]) -> Shown:
         if part
     ]
     return html.of_study("the ledger", *tallies, claims)
+
+
+def in_words(told: str) -> str:
+    """Return what a claim's statements say, with the families' labels and the changed settings in words.
+
+    Example:
+        >>> in_words("Hopper, PPO, logit-normal − gaussian, printed-clip: 3.0 [2.7, 3.6] (for)")
+        'Hopper, PPO, Logit-normal − Gaussian, printed clip: 3.0 [2.7, 3.6] (for)'
+    """
+    return _NAMED.sub(lambda name: _NAMES[name[0]], told)
+
+
+def _caption(found: Sequence[Finding]) -> str:
+    """Return the table's caption, which speaks of repeats only where a row has them."""
+    timed = f", of {TIMED} over ten repeats" if any(each.claim.id == TIMED for each in found) else ""
+    return (
+        f"Claims, with what is for and against them. In brackets {percent(LEVEL)} bootstrap intervals over seeds"
+        f"{timed}; p of a permutation test, corrected over the six robots (Holm). Open: the interval leaves both "
+        "possible, or, not after Holm, the test does not find what it shows. Moot: there is nothing to explain. "
+        "Exploratory: the protocol does not list such a number. Stays undecided: no missing cell can decide it."
+    )
 
 
 def _words(finding: Finding) -> str:

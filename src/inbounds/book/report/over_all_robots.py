@@ -12,7 +12,12 @@ from inbounds.book.drawing.figures import LOOKS
 from inbounds.book.report import html
 from inbounds.book.report.arms import columns_of
 from inbounds.book.report.html import Shown
-from inbounds.book.report.study_figures import interval_panels, performance_profiles
+from inbounds.book.report.study_figures import (
+    interval_note,
+    interval_panels,
+    performance_profiles,
+    profile_note,
+)
 from inbounds.book.report.words import ALGORITHMS, ARM_NAMES, HEADS, in_words, pair_name
 from inbounds.study import analysis
 from inbounds.study.analysis import CONTRASTS, ENDPOINTS, REFERENCE
@@ -44,7 +49,10 @@ def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
         }
         alt = f"IQM of the normalised {name} over all robots ({title}). {in_words(found)}"
         draw = functools.partial(_iqm, found, f"normalised {name}")
-        caption = f"{name.capitalize()}: IQM of all runs, normalised per robot ({NORMALIZED})."
+        caption = (
+            f"{name.capitalize()} ({title}): IQM of all runs, normalised per robot ({NORMALIZED}). "
+            f"{interval_note(found)}"
+        )
         parts.append(html.figure_of(draw, alt, caption))
     parts += [_improvement(outcomes, arm, title), *_without_diverged(outcomes, arm, title, columns)]
     parts += [_profiles(outcomes, f"{a.upper()}, {title}", columns[a]) for a in ALGORITHMS]
@@ -52,7 +60,7 @@ def over_all_robots(outcomes: Outcomes, arm: str) -> Shown:
 
 
 def _iqm(found: Mapping[str, Mapping[str, Estimate | None]], xlabel: str, narrow: bool) -> Figure:
-    return interval_panels(found, xlabel=xlabel, narrow=narrow)
+    return interval_panels(found, xlabel=xlabel, narrow=narrow, noted=False)
 
 
 def _improvement(outcomes: Outcomes, arm: str, title: str, *, without_diverged: bool = False) -> str:
@@ -102,8 +110,9 @@ def _profiles(outcomes: Outcomes, title: str, columns: Mapping[str, Column]) -> 
         f"Performance profiles ({title}): the share of runs above each normalised final return, a line "
         f"per family. Above 1: {above or 'missing'}"
     )
-    return html.figure_of(
-        lambda narrow: performance_profiles(profiles, xlabel="normalised final return τ", narrow=narrow),
-        alt,
-        f"{title}. {NORMALIZED}.",
-    )
+
+    def draw(narrow: bool) -> Figure:
+        return performance_profiles(profiles, xlabel="normalised final return τ", narrow=narrow, noted=False)
+
+    caption = f"Performance profiles ({title}): the share of runs above each normalised final return τ ({NORMALIZED})."
+    return html.figure_of(draw, alt, f"{caption} {profile_note(profiles)}")

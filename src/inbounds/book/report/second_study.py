@@ -17,7 +17,7 @@ from inbounds.book.report.study_panels import left_out
 from inbounds.book.report.words import HEADS, WAITS, column_name
 from inbounds.study.analysis import estimate
 from inbounds.study.cell import Cell
-from inbounds.study.grid import SECOND, second_cells
+from inbounds.study.grid import ROBOTS, SECOND, second_cells
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second import (
     GAUSSIAN,
@@ -44,6 +44,8 @@ BLOCKS = {
     "F": "F: other step sizes",
 }
 """Block → what it is called."""
+FOUND = ("confirmed", "contradicted")
+"""Findings of the primary comparison that say on which side of 0 a difference lies."""
 TOLERANCE = 0.02  # of the executed noise, before the start counts as unequal
 
 
@@ -95,12 +97,23 @@ def primary_comparison(outcomes: Outcomes) -> Shown:
     )
     return html.of_study(
         "the primary comparison",
-        html.figure_of(
-            of_robots(_bars(known)), alt, "Hollow: seeds are still to be run. Grey: within the margin."
-        ),
+        html.figure_of(of_robots(_bars(known)), alt, _caption(known)),
         html.table(caption, head, table, words=(0, 1, 2, 4)),
         *_without_diverged(with_second(outcomes), rows),
     )
+
+
+def _caption(rows: Sequence[PrimaryRow]) -> str:
+    """Return what the forest draws."""
+    (level,) = {row.difference.level for row in rows if row.difference is not None}
+    said = [
+        "Primary comparison: bounded law minus Gaussian with a free σ, PPO, both with executed noise 0.4 at the start, "
+        f"a panel per endpoint. Bars: {percent(level)} bootstrap intervals of a difference of means. Filled: found, "
+        "which is confirmed or contradicted in the table below. Hollow: not. Grey: within the margin."
+    ]
+    waiting = [row for row in rows if not row.whole]
+    robots = [robot for robot in ROBOTS if any(row.robot == robot for row in waiting)]
+    return " ".join([*said, *([f"Seeds are still to be run: {', '.join(robots)}."] if robots else [])])
 
 
 def _seeds(difference: Estimate | None) -> str:
@@ -133,10 +146,10 @@ def _without_diverged(outcomes: Outcomes, rows: Sequence[PrimaryRow]) -> Iterato
 
 
 def _bars(rows: Sequence[PrimaryRow]) -> dict[str, list[Bar]]:
-    """Return the differences by endpoint, as bars in units of the margin; hollow where seeds are still to be run."""
+    """Return the differences by endpoint, as bars in units of the margin; hollow where none is found."""
     return {
         name: [
-            Bar(row.robot, row.law, row.difference, row.margin, hollow=not row.whole)
+            Bar(row.robot, row.law, row.difference, row.margin, hollow=row.finding not in FOUND)
             for row in rows
             if row.endpoint == endpoint and row.difference is not None
         ]

@@ -23,7 +23,7 @@ def comparisons(outcomes: Outcomes) -> Shown:
     """Return the secondary tests whose cells are finished, as a table."""
     rows = [
         [
-            f"{row.pair.first.algorithm.upper()}: {column_name(row.pair.first)} − {column_name(row.pair.second)}",
+            _named(row.pair),
             row.robot,
             HEADS[row.endpoint],
             spoken(row.comparison.difference),
@@ -49,6 +49,13 @@ def comparisons(outcomes: Outcomes) -> Shown:
     ]
     caption = "Secondary comparisons of the second study: differences of means; nothing here is confirmed or refuted."
     return html.of_study("the secondary comparisons", html.table(caption, head, rows, words=(0, 1, 2, 4, 7)))
+
+
+def _named(pair: Pair) -> str:
+    """Return what is compared, as a difference; the start is said of both sides where they differ in it."""
+    quiet = ", quiet start" if pair.first.arm != pair.second.arm else ""
+    first = f"{column_name(pair.first)}{quiet}"
+    return f"{pair.first.algorithm.upper()}: {first} − {column_name(pair.second)}"
 
 
 def verdicts(outcomes: Outcomes, question: str, family: str, endpoint: str = "final") -> str:

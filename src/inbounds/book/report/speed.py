@@ -15,7 +15,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import json
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,7 +24,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from inbounds.book.drawing import alt_text
-from inbounds.book.report.html import Shown, bullets, missing, table
+from inbounds.book.report.html import Shown, bullets, missing, table, with_code
 from inbounds.study.words import number, p_value, percent
 
 ROOT = Path(__file__).resolve().parents[4]  # src/inbounds/book/report/speed.py
@@ -137,7 +136,7 @@ def how_measured(results: Results | None) -> Shown:
     if results is None:
         return _missing(what, AS_ABOVE)
     lines = [line.removeprefix("* ") for line in _benchmarks("report").how(results)]
-    return Shown(what, [_code(bullets(lines))])
+    return Shown(what, [with_code(bullets(lines))])
 
 
 def show_speed(results: Results | None) -> None:
@@ -296,7 +295,7 @@ def _with_curves(verdicts: Path) -> Results | None:
 
 
 def _missing(what: str, why: str) -> Shown:
-    return Shown(what, [_code(missing(why))])
+    return Shown(what, [with_code(missing(why))])
 
 
 def _show_missing(alt: str) -> None:
@@ -304,11 +303,6 @@ def _show_missing(alt: str) -> None:
     from IPython.display import display
 
     display({"text/html": missing(AS_ABOVE), "text/plain": f"Figure: {alt}"}, raw=True)
-
-
-def _code(html: str) -> str:
-    """Let words between backticks stand in the typewriter's face."""
-    return re.sub(r"`([^`]*)`", r"<code>\1</code>", html)
 
 
 def _label(name: str) -> str:

@@ -1,8 +1,9 @@
 """How the study is drawn: learning curves, intervals, differences, performance profiles.
 
-Every figure says what its band or bar is and how many seeds it rests on; a seed that diverged or was left out is
-counted beside its curve, and a cell that was not run, or not finished, keeps its place and is called missing. Data come
-in as the results of `inbounds.study.statistics`; nothing here reads a file or computes a statistic::
+Every figure says what its band or bar is and how many seeds it rests on, below its panels or, `noted=False`, in a
+caption (`curve_note` and its like); a seed that diverged or was left out is counted beside its curve, and a cell that
+was not run, or not finished, keeps its place and is called missing. Data come in as the results of
+`inbounds.study.statistics`; nothing here reads a file or computes a statistic::
 
     curves = {"Hopper-v5": {"beta": Curve(steps, learning_curve(returns, rng)), "logit-normal": None}}
     figures.show(learning_curves(curves), alt="Return against environment steps: ...")
@@ -15,15 +16,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from inbounds.book.drawing.figures import LOOKS, WIDTH, family_style, use_style
+from inbounds.book.drawing.figures import LOOKS, family_style, use_style
+from inbounds.book.report.profile_figures import performance_profiles, profile_note
 from inbounds.book.report.study_panels import (
-    NARROW,
     SMALL,
     families_in,
     family_legend,
@@ -31,13 +31,24 @@ from inbounds.book.report.study_panels import (
     list_gaps,
     lowest,
     note,
+    note_of,
     panel_grid,
     without_scale,
 )
-from inbounds.study.statistics import Comparison, Estimate, Profile
-from inbounds.study.words import p_equals
+from inbounds.study.statistics import Comparison, Estimate
+from inbounds.study.words import p_equals, verdict
 
-__all__ = ["Curve", "difference_panels", "interval_panels", "learning_curves", "performance_profiles"]
+__all__ = [
+    "Curve",
+    "curve_note",
+    "difference_note",
+    "difference_panels",
+    "interval_note",
+    "interval_panels",
+    "learning_curves",
+    "performance_profiles",
+    "profile_note",
+]
 
 _QUIET = "#5F6770"
 _NOT_PLANNED = "not planned"
@@ -59,7 +70,11 @@ class Curve:
 
 
 def learning_curves(
-    curves: Mapping[str, Mapping[str, Curve | None]], *, ylabel: str = "return", narrow: bool = False
+    curves: Mapping[str, Mapping[str, Curve | None]],
+    *,
+    ylabel: str = "return",
+    narrow: bool = False,
+    noted: bool = True,
 ) -> Figure:
     """Draw learning curves with bands: a panel per environment, a line per policy family.
 
@@ -67,6 +82,7 @@ def learning_curves(
         curves: per environment and family (a key of `LOOKS`) its curve, or None where the cell is missing.
         ylabel: what the curves show.
         narrow: one panel below the other, for a phone.
+        noted: with `curve_note` below the panels.
 
     Returns:
         The figure; each panel has its own vertical scale, for returns of different robots share no unit.
@@ -98,9 +114,15 @@ def learning_curves(
         for ax in lowest(axes, narrow=narrow):
             ax.set_xlabel("env steps per seed [millions]", fontsize=SMALL)
         family_legend(fig, families, narrow=narrow)
-        drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
-        note(fig, "Line", "Band", drawn, ", at each epoch by itself", narrow=narrow)
+        if noted:
+            note(fig, curve_note(curves), narrow=narrow)
     return fig
+
+
+def curve_note(curves: Mapping[str, Mapping[str, Curve | None]]) -> str:
+    """Say what line and band of learning curves are, and of how many seeds."""
+    drawn = [c.estimate for cells in curves.values() for c in cells.values() if c is not None]
+    return note_of("Line", "Band", drawn, ", at each epoch by itself")
 
 
 def _curve(ax: Any, family: str, curve: Curve) -> None:
@@ -126,6 +148,7 @@ def interval_panels(
     xlabel: str = "mean return over the last 10 % of epochs",
     reference: float | None = None,
     narrow: bool = False,
+    noted: bool = True,
 ) -> Figure:
     """Draw point estimates with interval bars: a panel per environment (or aggregate), a row per policy family.
 
@@ -135,6 +158,7 @@ def interval_panels(
         xlabel: what is estimated, with its unit.
         reference: where to draw a vertical line, such as 0 for differences.
         narrow: one panel below the other, for a phone.
+        noted: with `interval_note` below the panels.
 
     Returns:
         The figure; a hollow marker means that seeds were left out, and the row says how many.
@@ -152,10 +176,18 @@ def interval_panels(
     families = families_in(panels.values())
     rows = {f: (SHORT[f] if narrow else LOOKS[f].label, f) for f in families}
     cells = {
-        title: {f: (given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
+        title: {f: _Row(given.get(f), "" if f in given else _NOT_PLANNED) for f in families}
         for title, given in panels.items()
     }
-    return _bars(cells, rows, xlabel, reference, narrow=narrow)
+    return _bars(cells, rows, xlabel, reference, interval_note(panels) if noted else "", narrow=narrow)
+
+
+def interval_note(panels: Mapping[str, Mapping[str, Estimate | None]]) -> str:
+    """Say what marker and bar of point estimates are, and of how many seeds."""
+    drawn = [estimate for given in panels.values() for estimate in given.values() if estimate]
+    return note_of(
+        "Marker", "Bar", drawn, "", "Hollow: seeds are left out." if any(e.missing for e in drawn) else ""
+    )
 
 
 def difference_panels(
@@ -163,6 +195,7 @@ def difference_panels(
     *,
     xlabel: str = "difference of returns",
     narrow: bool = False,
+    noted: bool = True,
 ) -> Figure:
     """Draw differences between families with interval bars: a panel per environment, a row per pair.
 
@@ -170,9 +203,11 @@ def difference_panels(
         panels: per environment and pair (first, second) of families their comparison, first minus second.
         xlabel: what the difference is of, with its unit.
         narrow: one panel below the other, for a phone.
+        noted: with `difference_note` below the panels.
 
     Returns:
-        The figure, with a line at zero; beside each bar stands the p-value after Holm's correction.
+        The figure, with a line at zero; right of each row stands the p-value after Holm's correction. A marker is
+        filled where the interval leaves out 0 and the corrected test finds the difference, else hollow.
 
     Raises:
         ValueError: nothing to draw, or an unknown family.
@@ -191,37 +226,54 @@ def difference_panels(
     rows = {pair: (f"{SHORT[pair[0]]}\n− {SHORT[pair[1]]}", pair[0]) for pair in pairs}
     cells = {
         title: {
-            pair: (row.difference, p_equals(row.p_adjusted)) if (row := given.get(pair)) else (None, "")
+            pair: _Row(
+                row.difference, p_equals(row.p_adjusted), hollow=verdict(row) not in ("higher", "lower")
+            )
+            if (row := given.get(pair))
+            else _Row(None)
             for pair in pairs
         }
         for title, given in panels.items()
     }
-    return _bars(
-        cells,
-        rows,
-        xlabel,
-        reference=0.0,
-        remark="p: permutation test of the means, after Holm's correction over environments.",
-        narrow=narrow,
+    return _bars(cells, rows, xlabel, 0.0, difference_note(panels) if noted else "", narrow=narrow)
+
+
+def difference_note(panels: Mapping[str, Mapping[tuple[str, str], Comparison]]) -> str:
+    """Say what marker and bar of differences are, of how many seeds, and what p is."""
+    drawn = [row.difference for given in panels.values() for row in given.values() if row.difference]
+    said = (
+        "Filled: the interval leaves out 0, and the test finds the difference. Hollow: not. p: permutation test of "
+        "the means, after Holm's correction over the robots."
     )
+    return note_of("Marker", "Bar", drawn, "", said)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One row of `_bars`."""
+
+    estimate: Estimate | None
+    remark: str = ""
+    """Right of its panel."""
+    hollow: bool = False
 
 
 def _bars(
-    cells: Mapping[str, Mapping[Any, tuple[Estimate | None, str]]],
+    cells: Mapping[str, Mapping[Any, _Row]],
     rows: Mapping[Any, tuple[str, str]],
     xlabel: str,
     reference: float | None,
-    remark: str = "",
+    below: str,
     *,
     narrow: bool = False,
 ) -> Figure:
-    """Draw interval bars; `rows` gives each row's label and the family whose look it wears."""
+    """Draw interval bars; `rows` gives each row's label and the family whose look it wears, `below` a note."""
     with use_style():
         fig, axes = panel_grid(list(cells), row_height=0.8 + 0.52 * len(rows), sharey=True, narrow=narrow)
         for ax, given in zip(axes, cells.values(), strict=True):
-            for place, (key, (estimate, remark_here)) in enumerate(given.items()):
-                _bar(ax, place, rows[key][1], estimate, remark_here)
-            if any(estimate for estimate, _ in given.values()):
+            for place, (key, row) in enumerate(given.items()):
+                _bar(ax, place, rows[key][1], row)
+            if any(row.estimate for row in given.values()):
                 if reference is not None:
                     ax.axvline(reference, color=_QUIET, linewidth=1.2, zorder=1)
             else:
@@ -234,20 +286,22 @@ def _bars(
             ax.xaxis.set_major_locator(MaxNLocator(3))
         # One label for all panels; below them it would lie on the note, which the layout engine places there.
         fig.suptitle(textwrap.fill(xlabel[:1].upper() + xlabel[1:], 32 if narrow else 80), fontsize=13)
-        drawn = [estimate for given in cells.values() for estimate, _ in given.values() if estimate]
-        note(fig, "Marker", "Bar", drawn, "", remark, narrow=narrow)
+        if below:
+            note(fig, below, narrow=narrow)
     return fig
 
 
-def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: str) -> None:
-    """Draw one row: marker, interval, and in words what is not as it should be."""
+def _bar(ax: Any, place: int, family: str, row: _Row) -> None:
+    """Draw one row: marker, interval, right of the panel its remark, and in words what is not as it should be."""
+    estimate = row.estimate
+    beside: dict[str, Any] = {
+        "transform": ax.get_yaxis_transform(), "ha": "left", "va": "center", "fontsize": 10,
+    }  # fmt: skip
     if estimate is None:
-        ax.text(
-            0.5, place, remark or "missing", transform=ax.get_yaxis_transform(), ha="center", va="center",
-            style="italic", color=_QUIET, fontsize=SMALL,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-        )  # fmt: skip
+        ax.text(1.02, place, row.remark or "missing", style="italic", color=_QUIET, **beside)
         return
+    if row.remark:
+        ax.text(1.02, place, row.remark, **beside)
     value, low, high = (np.asarray(x) for x in (estimate.value, estimate.low, estimate.high))
     if value.ndim:
         raise ValueError(f"expected one number a row, got an estimate of shape {value.shape}")
@@ -255,61 +309,10 @@ def _bar(ax: Any, place: int, family: str, estimate: Estimate | None, remark: st
     ax.plot([low, high], [place, place], color=look.color, linewidth=2.2, linestyle="-")
     ax.plot(
         value, place, look.marker, color=look.color, markersize=8, markeredgewidth=1.8,
-        markerfacecolor="white" if estimate.missing else look.color,
+        markerfacecolor="white" if row.hollow or estimate.missing else look.color,
     )  # fmt: skip
-    words = ", ".join(filter(None, [remark, left_out(estimate)]))
-    if words:
+    if words := left_out(estimate):
         ax.text(
             0.99, place - 0.2, words, transform=ax.get_yaxis_transform(), ha="right", va="bottom", fontsize=10,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )  # fmt: skip
-
-
-def performance_profiles(
-    profiles: Mapping[str, Profile | None], *, xlabel: str = "normalised score τ", narrow: bool = False
-) -> Figure:
-    """Draw performance profiles with bands: the share of runs that score more than τ, a line per policy family.
-
-    Args:
-        profiles: per family its profile, or None where it is missing.
-        xlabel: what τ is, and how it is normalised.
-        narrow: for a phone.
-
-    Returns:
-        The figure.
-
-    Raises:
-        ValueError: nothing to draw, or an unknown family.
-
-    Example:
-        >>> from inbounds.study.statistics import performance_profile
-        >>> taus, rng = np.linspace(0, 1, 5), np.random.default_rng(0)
-        >>> fig = performance_profiles({"beta": performance_profile({"Ant-v5": rng.random(10)}, taus, rng)})
-        >>> fig.axes[0].get_xlabel()
-        'normalised score τ'
-    """
-    families = families_in([profiles])
-    with use_style():
-        fig, ax = plt.subplots(figsize=(NARROW if narrow else WIDTH, 4.6))
-        for family, profile in profiles.items():
-            if profile is not None:
-                style = family_style(family)
-                tau, share = profile.thresholds, profile.share
-                ax.fill_between(tau, share.low, share.high, color=style["color"], alpha=0.18, linewidth=0)
-                every = max(1, len(tau) // 5)
-                first = list(LOOKS).index(family) * every // len(LOOKS)
-                ax.plot(
-                    tau,
-                    share.value,
-                    marker=LOOKS[family].marker,
-                    markevery=(first, every),
-                    linewidth=1.8,
-                    **style,
-                )
-        list_gaps(ax, {family: p.share if p else None for family, p in profiles.items()}, at_left=False)
-        ax.set(xlabel=xlabel, ylabel="share of runs above τ", ylim=(-0.02, 1.02))
-        ax.yaxis.set_major_formatter(PercentFormatter(xmax=1.0, decimals=0))
-        family_legend(fig, families, narrow=narrow)
-        shares = [p.share for p in profiles.values() if p]
-        note(fig, "Line", "Band", shares, ", at each τ by itself", narrow=narrow)
-    return fig

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 import matplotlib.pyplot as plt
@@ -99,17 +99,8 @@ def family_legend(fig: Figure, families: list[str], *, narrow: bool = False) -> 
     )
 
 
-def note(
-    fig: Figure,
-    mark: str,
-    band: str,
-    drawn: list[Estimate],
-    where: str,
-    remark: str = "",
-    *,
-    narrow: bool = False,
-) -> None:
-    """Say below the panels what is drawn, what the interval is, and of how many seeds: one kind a figure."""
+def note_of(mark: str, band: str, drawn: Sequence[Estimate], where: str, remark: str = "") -> str:
+    """Say what is drawn, what the interval is, and of how many seeds: one kind a figure."""
     kinds = sorted({(estimate.statistic, estimate.level) for estimate in drawn})
     if len(kinds) > 1:
         raise ValueError(f"one figure, one statistic and one level; got {kinds}: draw them apart")
@@ -125,10 +116,15 @@ def note(
         text = (
             f"{mark}: {statistic}. {band}: {percent(level)} bootstrap interval{where}{limit}.{count} {remark}"
         )
+    return text.strip()
+
+
+def note(fig: Figure, text: str, *, narrow: bool = False) -> None:
+    """Write below the panels what is drawn."""
     # A legend of nothing but its title: the layout engine keeps room for it below the panels.
     fig.legend(
         handles=[],
-        title=textwrap.fill(text.strip(), 40 if narrow else 80),
+        title=textwrap.fill(text, 40 if narrow else 80),
         title_fontsize=SMALL,
         loc="outside lower left",
     )

@@ -56,13 +56,14 @@ def column_name(column: Column) -> str:
     """Return what a column is called within its arm.
 
     Example:
-        >>> column_name(Column("equal", "ppo", "gaussian", "free-std"))
-        'Gaussian free σ'
+        >>> [column_name(Column(arm, "ppo", "gaussian", "free-std")) for arm in ("equal", "as-they-come")]
+        ['Gaussian free σ', 'Gaussian free σ, start at σ = 1']
     """
     free = column.variant == FREE or (column.arm == "steps" and column.family == "gaussian")
     sigma = " free σ" if free else " σ(s)" if column.family == "gaussian" else ""
     changed = "" if column.variant in ("", FREE) else f", {change_name(column.variant)}"
-    return f"{SHORT[column.family]}{sigma}{changed}"
+    start = ", start at σ = 1" if column.arm == "as-they-come" else ""
+    return f"{SHORT[column.family]}{sigma}{changed}{start}"
 
 
 def change_name(variant: str) -> str:
@@ -103,36 +104,36 @@ WAITS = "waits for seeds"
 def by_robot(verdicts: Sequence[tuple[str, str]]) -> str:
     """Return on which robots a difference is found above 0 or below, suggested or too small, and on how many it is not.
 
+    What holds on no robot is left out.
+
     Args:
-        verdicts: robot, and what `graded` says there, or *too small to matter*, or `WAITS`.
+        verdicts: robot, and what `graded` says there, or *too small to matter*, or `WAITS`; other words count as none.
 
     Example:
         >>> by_robot([("Ant", "higher"), ("Hopper", "suggested below")])
-        'above on 1 of 2 robots (Ant), below on none, suggested below on 1 (Hopper)'
+        'above on 1 of 2 robots (Ant), suggested below on 1 (Hopper)'
         >>> by_robot([("Hopper", "lower"), ("Humanoid", WAITS)])
-        'above on none of 2 robots, below on 1 (Hopper), seeds still to be run on 1 (Humanoid)'
+        'below on 1 of 2 robots (Hopper), seeds still to be run on 1 (Humanoid)'
+        >>> by_robot([("Ant", ""), ("Hopper", "")])
+        'above or below on none of 2 robots'
         >>> by_robot([])
         'not run yet'
     """
     if not verdicts:
         return "not run yet"
-    where: dict[str, list[str]] = {}
-    for robot, verdict in verdicts:
-        where.setdefault(verdict, []).append(robot)
-
-    def told(name: str, word: str, size: str = "") -> str:
-        found = where.get(word, [])
-        return f"{name} on {len(found) or 'none'}{size}" + (f" ({', '.join(found)})" if found else "")
-
-    parts = [told("above", "higher", f" of {robots(len(verdicts))}"), told("below", "lower")]
-    parts += [
-        told("seeds still to be run" if word == WAITS else word, word)
+    words = [("above", "higher"), ("below", "lower")]
+    words += [
+        ("seeds still to be run" if word == WAITS else word, word)
         for word in ("suggested above", "suggested below", "too small to matter", WAITS)
-        if word in where
     ]
-    if "unresolved" in where:
-        parts.append(f"no difference found on {len(where['unresolved'])}")
-    return ", ".join(parts)
+    parts: list[str] = []
+    for said, word in (*words, ("no difference found", "unresolved")):
+        found = [robot for robot, verdict in verdicts if verdict == word]
+        if found:
+            size = "" if parts else f" of {robots(len(verdicts))}"
+            named = "" if word == "unresolved" else f" ({', '.join(found)})"
+            parts.append(f"{said} on {len(found)}{size}{named}")
+    return ", ".join(parts) or f"above or below on none of {robots(len(verdicts))}"
 
 
 def robots(count: int) -> str:
