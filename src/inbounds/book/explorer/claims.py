@@ -16,6 +16,7 @@ from typing import Any
 from inbounds.book.explorer.assets import carried_scripts, style_sheet
 from inbounds.book.report import html
 from inbounds.book.report.html import Shown
+from inbounds.book.report.ledger_table import in_words
 from inbounds.book.templates import macros
 from inbounds.study.ledger import Finding
 from inbounds.study.ledger.quotes import judged_anew, quote, verdict
@@ -67,7 +68,7 @@ def _line(finding: Finding) -> dict[str, Any]:
         "place": said.place if said else "",
         "test": finding.claim.test,
         "anew": judged_anew(finding),
-        "told": finding.told.splitlines(),
+        "told": in_words(finding.told).splitlines(),
         "counted": f"{finding.counted} ({finding.claim.standing})",
         "command": finding.claim.command,
     }

@@ -183,7 +183,7 @@ def difference_table(outcomes: Outcomes, arm: str, algorithm: str) -> Shown:
         parts = [html.figure_of(draw, alt, caption), *parts]
     gone = sum(int(outcome.diverged.sum()) for _, _, outcome in part.finished())
     if not gone:
-        said = html.paragraph("No seed diverged here: without such seeds every number is the same.")
+        said = html.paragraph("No seed diverged here, so leaving such seeds out changes no number.")
         return part.shown("differences", *parts, said)
     fewer = {
         c: [analysis.differences(outcomes, c, e, without_diverged=True) for e in ENDPOINTS] for c in contrasts

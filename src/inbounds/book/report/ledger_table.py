@@ -102,20 +102,15 @@ def counted(found: Sequence[Finding]) -> str:
     told = ", ".join(f"{verdicts[word]} {word}" for word in words)
     stay = sum(each.outlook == STAYS for each in found if verdict(each) == "undecided")
     rest = (
-        f"; of the undecided {stay} {'stays' if stay == 1 else 'stay'} so whatever cell arrives"
-        if stay
-        else ""
+        f"; {stay} of the undecided cannot be decided by the cells that are still to be run" if stay else ""
     )
     return f"{len(found)} claim{'' if len(found) == 1 else 's'}: {told}{rest}."
 
 
 def decided(found: Sequence[Finding]) -> Shown:
     """Return the claims that are decided, as a list without their numbers; a paragraph where none is."""
-    told = [
-        f"{each.verdict.capitalize()}: {each.claim.says}"
-        for each in found
-        if verdict(each) in ("supported", "refuted")
-    ]
-    return html.of_study(
-        "what is decided", html.bullets(told) if told else html.missing("No claim is decided yet.")
-    )
+    parts = []
+    for word in ("supported", "refuted"):
+        if told := [each.claim.says for each in found if verdict(each) == word]:
+            parts += [html.paragraph(f"{word.capitalize()}:"), html.bullets(told)]
+    return html.of_study("what is decided", *(parts or [html.missing("No claim is decided yet.")]))

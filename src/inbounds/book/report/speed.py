@@ -261,7 +261,7 @@ def _compared(found: Results, who: ModuleType) -> Sequence[str]:
     word, (low, high) = found["word"], found["interval_90"]
     if word == "undecided":
         word += f"; with equal means {found['seeds_needed']} seeds a side would show them equivalent in 8 of 10 cases"
-    difference = f"{number(found['difference'])} ({number(low)} to {number(high)})"
+    difference = f"{number(found['difference'])} [{number(low)}, {number(high)}]"
     return [*means, difference, margin, p_value(found["p_value"]), word]
 
 
@@ -274,7 +274,7 @@ def _verdict(found: Results, who: ModuleType) -> Sequence[str]:
         verdict = (
             f"not shown; with equal means {found['seeds_needed']} seeds a side would show it in 8 of 10 cases"
         )
-    ratio = f"{found['ratio']:.2f} ({found['low']:.2f} to {found['high']:.2f})"
+    ratio = f"{found['ratio']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
     return [*means, ratio, f"{found['p_value']:.3f}", verdict]
 
 

@@ -189,5 +189,5 @@ def draw(rows: Sequence[Row], ways: Mapping[str, str] = WAYS) -> Figure:
     first.set_ylim(len(lines) - 0.4, -0.6)
     for label, row in zip(first.get_yticklabels(), lines, strict=True):
         label.set_fontweight("normal" if isinstance(row, Row) else "bold")
-    fig.supxlabel("return less the median's, % of the median's")
+    fig.supxlabel("return minus the median's [% of the median's]")
     return fig
