@@ -141,7 +141,7 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "a sample may sit on a bound",
         "distributions/open_interval.py",
-        "return torch.clamp(value, smallest, largest)",
+        "return torch.clamp(value, *(ends or open_ends(low, high)))",
         "return value",
         "tests/distributions/test_contract.py::test_no_latent_maps_onto_a_bound",
     ),

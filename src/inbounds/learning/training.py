@@ -317,9 +317,8 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
     """
     start = time.perf_counter()
     if config.engine == "compiled":
-        short = dataclasses.replace(
-            config.algorithm, horizon=max(2, config.algorithm.minibatch_size), num_epochs=1
-        )
+        steps = max(2, config.algorithm.minibatch_size)
+        short = dataclasses.replace(config.algorithm, horizon=steps, num_epochs=1)
         trainer = Trainer(dataclasses.replace(config, seeds=config.seeds[:1], algorithm=short), make_envs)
         with contextlib.closing(trainer.envs), warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergedSeedWarning)  # the run itself will speak of its own seeds
@@ -328,31 +327,23 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
 
 
 def make_environments(config: TrainConfig, num_envs: int) -> Environments:
-    """Return one environment per seed: robots in one batch where we have them, else Gymnasium's, one by one.
+    """Return a vector environment that resets in the step that ends an episode: our robots, or Gymnasium's.
 
     Args:
         config: names the environment and the action mode.
         num_envs: number of seeds.
 
-    Returns:
-        A vector environment that resets in the step that ends an episode.
-
     Raises:
         ValueError: one of our robots without its version, which Gymnasium would take for another.
-        gymnasium.error.Error: Gymnasium cannot make it; a note says what else to pass.
     """
     if config.env.removeprefix("inbounds/") in TASK_NAMES:
         return robots.make(config.env, num_envs, action_mode=config.action_mode)
     if (versioned := f"{config.env.removeprefix('inbounds/')}-v5") in TASK_NAMES:
         raise ValueError(f"{config.env} names no version: ask for {versioned}")
+    make = [lambda: gymnasium.make(config.env)] * num_envs
     with naming_the_backend():  # Gymnasium has robots, too
         try:
-            return SyncVectorEnv(
-                [lambda: gymnasium.make(config.env)] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP
-            )
+            return SyncVectorEnv(make, autoreset_mode=AutoresetMode.SAME_STEP)
         except gymnasium.error.Error as error:
-            error.add_note(
-                f"For an environment of your own that is not registered, pass make_envs= beside {config.env!r}, on "
-                "resuming, too; for one in a module, ask for module:id."
-            )
+            error.add_note(f"For one of your own pass make_envs= beside {config.env!r}, on resuming, too.")
             raise

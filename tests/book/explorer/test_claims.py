@@ -8,6 +8,7 @@ import pytest
 from inbounds.book.explorer.assets import style_sheet
 from inbounds.book.explorer.claims import ELEMENT, FEW, MARKS, claims
 from inbounds.book.report import study_pages
+from inbounds.book.report.ledger_table import in_words
 from inbounds.study.ledger import CLAIMS, Finding, judge
 from inbounds.study.ledger.quotes import quote, verdict
 from inbounds.study.ledger.verdicts import Verdict
@@ -42,7 +43,7 @@ def test_each_claim_opens_to_the_words_of_the_thesis(found: list[Finding]) -> No
             assert "<blockquote>" not in rest
         else:
             assert f"<blockquote>“{said.words}” ({said.place})</blockquote>" in rest
-        assert all(f"<li>{told}</li>" in rest for told in each.told.splitlines())
+        assert all(f"<li>{told}</li>" in rest for told in in_words(each.told).splitlines())
         assert each.claim.test in rest
         assert each.counted in rest
         assert f"<code>{each.claim.command}</code>" in rest

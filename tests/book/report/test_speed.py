@@ -144,7 +144,7 @@ def test_verdicts_say_what_was_shown_and_what_was_not(tmp_path: Path) -> None:
     html = speed.verdict_table(validation(tmp_path)).html
     same = ["1,234 ± 56", "1,234 ± 56"]
     hopper, ant, walker = rows(html)
-    assert hopper == ["Hopper-v5", *same, "1.01 (0.93 to 1.10)", "0.012", "equivalent"]
+    assert hopper == ["Hopper-v5", *same, "1.01 [0.93,\N{NO-BREAK SPACE}1.10]", "0.012", "equivalent"]
     assert ant[-1].startswith("not shown; with equal means 31 seeds")
     assert walker == ["Walker2d-v5", *same, "–", "–", "undecided: train longer"]
     assert "seeds a side (3 on Hopper-v5, 4 on Ant-v5, 3 on Walker2d-v5), 8,192 env steps" in html
@@ -207,7 +207,7 @@ def test_the_anchor_says_its_word_and_its_numbers(tmp_path: Path) -> None:
     assert repr(shown) == repr(speed.anchor_table(None))
     ant, hopper, walker = rows(shown.html)
     same = ["1234 ± 56.0", "−12.0 ± 7.6"]
-    numbers = ["−1246 (−1300 to 2.4)", "± 1170", "0.012"]
+    numbers = ["−1246 [−1300,\N{NO-BREAK SPACE}2.4]", "± 1170", "0.012"]
     assert ant == ["Ant-v5", *same, *numbers, "different"]
     assert hopper[:-1] == ["Hopper-v5", *same, *numbers]
     assert hopper[-1].startswith("undecided; with equal means 31 seeds a side")

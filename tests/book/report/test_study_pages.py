@@ -185,7 +185,7 @@ def test_a_ledger_row_holds_claim_verdict_numbers_and_command(some: Outcomes) ->
         )
     assert "1 refuted, 1 undecided, 1 not tested" in ledger_table.counted(thesis)
     assert ledger_table.counted(found[:1]).startswith("1 claim: ")
-    assert "Refuted: " in study_pages.decided(found).html
+    assert "<p>Refuted:</p>" in study_pages.decided(found).html
 
 
 def test_the_caption_says_what_a_time_is_repeated_over_where_a_row_has_one(nothing: Outcomes) -> None:
