@@ -23,7 +23,7 @@ from torch import Tensor, nn
 from inbounds.distributions import ClippedNormal, LogitNormal
 from inbounds.distributions.bounds import require_bounds
 from inbounds.distributions.boxes import require_box
-from inbounds.distributions.open_interval import from_line, open_ends
+from inbounds.distributions.open_interval import from_line, open_ends, to_line
 from inbounds.integrations.quiet import quiet_scale
 
 try:
@@ -162,15 +162,14 @@ class LogitNormalPolicy(ActorCriticPolicy):
     def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
         """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
         latent = _floating(scaled_action)
-        law = _law(latent, *self._limits(latent))
-        low, high = self._bounds  # of a narrower type than the law's, they could be reached by rounding
-        value = law.latent_to_value(latent).numpy().astype(low.dtype)
+        low, high = self._bounds  # of a narrower type than the latent's, they could be reached by rounding
+        value = from_line(latent, *self._limits(latent)).numpy().astype(low.dtype)
         return np.clip(value, np.nextafter(low, high), np.nextafter(high, low))
 
     def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
         """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
         value = _floating(action)
-        return _law(value, *self._limits(value)).value_to_latent(value).numpy()
+        return to_line(value, *self._limits(value)).numpy()
 
     def _limits(self, like: Tensor) -> tuple[Tensor, Tensor]:
         """Return the bounds `[A]` as tensors of the type and on the device of another."""
@@ -235,11 +234,6 @@ class LogitNormalActor(nn.Module):
         """Return the medians `[B, A]`, strictly inside the box."""
         latent = self.head(self.think.forward_actor(self.see(obs)))
         return from_line(latent, self.low, self.high, (self.smallest, self.largest))
-
-
-def _law(like: Tensor, low: Tensor, high: Tensor) -> LogitNormal:
-    """Return a law on the box, of which only the map between latents and actions `[..., A]` counts."""
-    return LogitNormal(torch.zeros_like(like), torch.ones_like(like), low, high, validate_args=False)
 
 
 def _floating(array: NDArray[Any]) -> Tensor:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from inbounds.book.building import builds_the_book
-from inbounds.book.drawing.narrow import rearrange
+from inbounds.book.drawing.narrow import rearrange, titles_and_labels, visible, within
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,15 +123,7 @@ def _require_a_page(fig: Figure, alt: str) -> None:
 def _cut_off(fig: Figure) -> list[str]:
     """Return which titles and labels of a figure reach beyond its edge."""
     fig.draw_without_rendering()
-    of_axes = [text for ax in fig.axes for text in (ax.title, ax.xaxis.label, ax.yaxis.label)]
-    page, cut = fig.bbox, []
-    for text in (*of_axes, *fig.texts):
-        if not text.get_visible() or not text.get_text().strip():
-            continue
-        box = text.get_window_extent()
-        if not (page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1):
-            cut.append(repr(text.get_text()))
-    return cut
+    return [repr(text.get_text()) for text in visible(titles_and_labels(fig)) if not within(fig, text)]
 
 
 def show(fig: Figure, alt: str) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.gridspec import GridSpec, SubplotSpec
     from matplotlib.legend import Legend
     from matplotlib.text import Text
 
@@ -43,14 +43,16 @@ def rearrange(fig: Figure) -> bool:
         [0, 1, 2]
         >>> plt.close(fig)
     """
+    from matplotlib.gridspec import GridSpec
+
     panels = _panels(fig)
     if not panels or fig.get_figwidth() <= WIDTH:
         return False
     grid = _spec(panels[0][0]).get_gridspec()
     columns = 1 if len(panels) <= MOST_IN_A_COLUMN else 2
-    if columns < grid.ncols:
-        _regrid(fig, panels, grid, columns)
     rows = -(-len(panels) // columns)
+    if columns < grid.ncols:
+        _regrid(panels, grid, GridSpec(rows, columns, figure=fig))
     height = fig.get_figheight() / grid.nrows
     fig.set_size_inches(WIDTH, height if len(panels) == 1 else rows * min(height, TALLEST_PANEL))
     _wrap(fig.texts, LONGEST_LINE)
@@ -62,7 +64,7 @@ def rearrange(fig: Figure) -> bool:
     fig.draw_without_rendering()
     for ax in fig.axes:
         _uncover(fig, ax, alone=len(panels) == 1)
-    _wrap([ax.xaxis.label for ax in fig.axes if not _within(fig, ax.xaxis.label)], LONGEST_LINE // 2)
+    _wrap([ax.xaxis.label for ax in fig.axes if not within(fig, ax.xaxis.label)], LONGEST_LINE // 2)
     fig.draw_without_rendering()
     return _readable(fig)
 
@@ -93,21 +95,18 @@ def _spec(ax: Axes) -> SubplotSpec:
     return spec
 
 
-def _regrid(fig: Figure, panels: Sequence[Sequence[Axes]], grid: Any, columns: int) -> None:
-    """Put the panels into so many columns, each with the labels that it shared with a neighbour."""
-    from matplotlib.gridspec import GridSpec
-
+def _regrid(panels: Sequence[Sequence[Axes]], grid: Any, new: GridSpec) -> None:
+    """Put the panels into another grid, each with the labels that it shared with a neighbour."""
     leaders = {_spec(ax).rowspan.start: ax for ax, *_ in reversed(panels)}
-    new = GridSpec(-(-len(panels) // columns), columns, figure=fig)
     for number, (ax, *twins) in enumerate(panels):
         leader = leaders[_spec(ax).rowspan.start]
-        if number % columns == 0 and ax.axison:
+        if number % new.ncols == 0 and ax.axison:
             ax.tick_params(labelleft=leader.yaxis.get_tick_params()["labelleft"])
             ax.set_ylabel(ax.get_ylabel() or leader.get_ylabel())
         if grid.nrows > 1 and ax.axison:
             ax.tick_params(labelbottom=True)
         for each in (ax, *twins):
-            each.set_subplotspec(new[number // columns, number % columns])
+            each.set_subplotspec(new[number // new.ncols, number % new.ncols])
 
 
 def _narrow(fig: Figure, legend: Any) -> None:
@@ -145,14 +144,15 @@ def _covers(legend: Legend, ax: Axes) -> bool:
     )
 
 
-def _within(fig: Figure, shown: Artist) -> bool:
+def within(fig: Figure, shown: Artist) -> bool:
+    """Whether nothing of a drawn text or legend reaches beyond the figure's edge."""
     box, page = shown.get_window_extent(), fig.bbox
     return page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
 
 
 def _readable(fig: Figure) -> bool:
-    texts = [*fig.texts, *(text for ax in fig.axes for text in (*ax.texts, ax.title, *_labels(ax)))]
-    inside = all(_within(fig, shown) for shown in [*_visible(texts), *_legends(fig)])
+    texts = [*titles_and_labels(fig), *(text for ax in fig.axes for text in ax.texts)]
+    inside = all(within(fig, shown) for shown in [*visible(texts), *_legends(fig)])
     ticks = [_boxes(axis.get_ticklabels()) for ax in fig.axes if ax.axison for axis in (ax.xaxis, ax.yaxis)]
     notes = [_boxes(ax.texts) for ax in fig.axes]
     apart = not any(a.overlaps(b) for group in (*ticks, *notes) for a, b in itertools.combinations(group, 2))
@@ -173,13 +173,15 @@ def _legends(fig: Figure) -> list[Legend]:
     return [*fig.legends, *(legend for ax in fig.axes if (legend := ax.get_legend()) is not None)]
 
 
-def _labels(ax: Axes) -> list[Text]:
-    return [ax.xaxis.label, ax.yaxis.label]
+def titles_and_labels(fig: Figure) -> list[Text]:
+    """Return the titles and labels of a figure's panels, and the texts of the figure itself."""
+    return [*(text for ax in fig.axes for text in (ax.title, ax.xaxis.label, ax.yaxis.label)), *fig.texts]
 
 
-def _visible(texts: Iterable[Any]) -> list[Any]:
+def visible(texts: Iterable[Any]) -> list[Any]:
+    """Return those texts that are shown and say something."""
     return [text for text in texts if text.get_visible() and text.get_text().strip()]
 
 
 def _boxes(texts: Iterable[Any]) -> list[Any]:
-    return [text.get_window_extent() for text in _visible(texts)]
+    return [text.get_window_extent() for text in visible(texts)]
