@@ -123,9 +123,10 @@ def test_seeds_read_as_they_are_written(seeds: tuple[int, ...]) -> None:
         ("train --algo sac", "'policy-gradient'"),
         ("train --algorithm.clip-range -1", "clip_range must be positive"),
         ("train --algorithm.clip-rnge 0.1", "--algorithm.clip-range"),
-        ("train --algorithm.minibatch-size 100", "minibatch_size must divide horizon"),
+        ("train --algorithm.minibatch-size 100", "= 20 × 100 + 48; 64 would"),
         ("train --seeds ten", "a number of seeds (10), some of them (0,7)"),
         ("train --seeds 1,1", "seeds must be different"),
+        ("train --seeds 0", "'0' names no seeds"),
         ("train --seeds 5-3", "'5-3' names no seeds"),
         ("train --seeds 99999999999", "asks for 99999999999 seeds; one run holds at most 10000"),
         ("train --seeds ,", "',' names no seeds"),
@@ -205,6 +206,14 @@ def test_the_dial_has_examples_of_its_own(words: list[str]) -> None:
     assert all(line.startswith("  inbounds study dial ") for line in examples.splitlines())
     assert examples not in succeeds(["study", "--help"])
     assert examples not in succeeds(["--help"])
+
+
+@pytest.mark.parametrize(("word", "number"), [("run", 2), ("status", 1), ("verify", 1), ("ledger", 6)])
+def test_a_word_of_the_study_has_its_own_examples_or_the_study_s(word: str, number: int) -> None:
+    _, examples = succeeds(["study", word, "--help"]).split("\nexamples:\n")
+    lines = examples.splitlines()
+    assert len(lines) == number
+    assert all(line.startswith(f"  inbounds study {word}") == (number < 6) for line in lines)
 
 
 def test_the_version() -> None:

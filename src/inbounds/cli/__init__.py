@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import sys
 from collections.abc import Sequence
@@ -139,10 +140,13 @@ def _run(args: list[str]) -> int:
 
 
 def _examples(args: list[str]) -> str:
-    """Return those of the command that the words name, else one command's after another."""
+    """Return those of the command that the words name, else of the one it belongs to, else one after another."""
+    named = " ".join(itertools.takewhile(lambda word: not word.startswith("-"), args))
     for words in (2, 1):
         if (name := " ".join(args[:words])) in EXAMPLES:
-            return EXAMPLES[name]
+            lines = EXAMPLES[name].splitlines()
+            of_its_own = [line for line in lines if f"{line} ".startswith(f"  inbounds {named} ")]
+            return "\n".join(of_its_own or lines)
     return "\n".join(text for name, text in EXAMPLES.items() if " " not in name)
 
 

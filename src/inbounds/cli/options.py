@@ -60,6 +60,8 @@ def parse_seeds(text: str) -> tuple[int, ...]:
                 raise ValueError
         else:
             first, last = 0, int(text) - 1
+            if last < first:
+                raise ValueError
     except ValueError:
         raise ValueError(
             f"{text[:80]!r} names no seeds: give a number of seeds (10), some of them (0,7) or a range (10-19)"

@@ -89,7 +89,7 @@ def printed(page: str) -> dict[str, Any]:
         if (
             cell.cell_type != "code"
             or not hidden
-            or re.match(r"study_pages|answers|as_they_come", cell.source)
+            or re.match(r"study_pages|answers|as_they_come|study_explorer", cell.source)
         ):
             continue
         exec(compile(cell.source, page, "exec"), names)

@@ -74,12 +74,14 @@ def check_minibatches(horizon: int, minibatch_size: int, normalized: int | None 
     Example:
         >>> check_minibatches(100, 64)
         Traceback (most recent call last):
-        ValueError: minibatch_size must divide horizon, but 100 = 1 × 64 + 36
+        ValueError: minibatch_size must divide horizon, but 100 = 1 × 64 + 36; 50 would
     """
     quotient, rest = divmod(horizon, minibatch_size)
     if rest:
+        divisor = next(size for size in range(min(minibatch_size, horizon), 0, -1) if horizon % size == 0)
         raise ValueError(
-            f"minibatch_size must divide horizon, but {horizon} = {quotient} × {minibatch_size} + {rest}"
+            f"minibatch_size must divide horizon, but {horizon} = {quotient} × {minibatch_size} + {rest}; "
+            f"{divisor} would"
         )
     if normalized == 1:
         raise ValueError(

@@ -153,7 +153,7 @@ def resample(scores: Floats, statistic: str, index: NDArray[np.int64]) -> Floats
     seeds_last = np.moveaxis(scores, 0, -1)  # [..., n]
     size = max(1, _CHUNK // max(1, index.shape[1] * seeds_last[..., 0].size))
     parts = [
-        np.moveaxis(function(seeds_last[..., index[start : start + size]]), -1, 0)
+        np.moveaxis(function(seeds_last.take(index[start : start + size], axis=-1)), -1, 0)
         for start in range(0, len(index), size)
     ]
     return np.concatenate(parts)
