@@ -49,8 +49,12 @@ class RunningNormalizer:
 
     def __call__(self, obs: NDArray[Any]) -> NDArray[Any]:
         """Return observations `[S, O]` normalised by the statistics so far, without taking them in."""
-        scaled = (obs - self.mean) / np.sqrt(self.squares / max(self.count, 1) + EPSILON)
-        return np.minimum(np.maximum(scaled, -CLIP), CLIP).astype(self.dtype)
+        return np.minimum(np.maximum((obs - self.mean) / self.std, -CLIP), CLIP).astype(self.dtype)
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviations `[S, O]` of the observations so far, none of them zero."""
+        return np.sqrt(self.squares / max(self.count, 1) + EPSILON)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that the future depends on."""

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
+from torch import nn
 from torch.distributions import Distribution
 
 from inbounds.learning.config import TrainConfig
 from inbounds.learning.families.policy import Policy
 from inbounds.learning.networks.normalizer import RunningNormalizer
 from inbounds.learning.networks.perceptron import Mlp
+from inbounds.learning.storage.deployed import DeployedPolicy
 
 
 class TrainedPolicy:
@@ -117,11 +119,7 @@ class TrainedPolicy:
                 does not offer.
         """
         outputs, shape = self._outputs(obs)
-        if greedy not in self.greedy_choices:
-            raise ValueError(
-                f"{self.config.policy.family} does not act by {greedy!r}: "
-                f"choose one of {', '.join(self.greedy_choices)}"
-            )
+        self._require(greedy, self.greedy_choices)
         if self.diverged or not len(outputs):  # a part of a diverged policy's weights may be finite
             return np.broadcast_to(self._policy.centre.astype(self._policy.dtype), shape).copy()
         if greedy == "sample":
@@ -158,6 +156,41 @@ class TrainedPolicy:
             )
         outputs, shape = self._outputs(obs)
         return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], outputs.shape[-1]))
+
+    def module(self, greedy: str = "median") -> nn.Module:
+        """Return the policy as a PyTorch module for `torch.export` and ONNX, to run where `inbounds` is not.
+
+        It takes observations `[B, O]` as the environment has them, normalises them itself, and returns actions
+        `[B, A]` in the robot's units: those of `act`, to rounding. Nothing warns there of an observation that is NaN.
+
+        Args:
+            greedy: "median", or "mean" or "mode", as the family offers; a Beta's median is none of PyTorch's, and
+                ONNX has the median of the others and the mean of a Beta.
+
+        Raises:
+            ValueError: the policy has diverged, or the family does not offer that greedy action, or not as a module.
+
+        Example:
+            >>> from inbounds.learning import Trainer, preset
+            >>> policy = Trainer(preset("common", "Hopper-v5", seeds=1)).policies[0]
+            >>> module, obs = policy.module(), torch.rand(5, 11)
+            >>> batch = {0: torch.export.Dim("batch", min=1, max=1024)}  # else five at a time, for ever
+            >>> deployed = torch.export.export(module, (obs,), dynamic_shapes=(batch,)).module()
+            >>> bool(np.abs(deployed(obs[:1]).numpy() - policy.act(obs[:1])).max() < 1e-6)
+            True
+        """
+        if self.diverged:
+            raise ValueError("the policy has diverged: there is nothing to deploy; take another seed")
+        self._require(greedy, self.greedy_choices[:-1])
+        normalizer = self._normalizer
+        statistics = None if normalizer is None else (normalizer.mean[0], normalizer.std[0])
+        return DeployedPolicy(self._policy, self._network.layers, statistics, greedy).eval()
+
+    def _require(self, greedy: str, choices: Sequence[str]) -> None:
+        if greedy not in choices:
+            raise ValueError(
+                f"{self.config.policy.family} does not act by {greedy!r}: choose one of {', '.join(choices)}"
+            )
 
     def _outputs(self, obs: ArrayLike) -> tuple[NDArray[Any], tuple[int, ...]]:
         """Return the network's outputs `[B, 2A]` and the shape that actions for `obs` have."""
