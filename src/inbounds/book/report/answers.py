@@ -133,7 +133,7 @@ def _verdict(row: Evidence) -> str:
 
 
 def short(rows: Sequence[Evidence]) -> str:
-    """Return `counted` in fewer words, without grades; of how many robots, where not all have run.
+    """Return on how many robots a law is above and below, without grades; of how many, where not all have run.
 
     Example:
         >>> short([])
@@ -141,9 +141,9 @@ def short(rows: Sequence[Evidence]) -> str:
     """
     if not rows:
         return "not run yet"
-    above, below = sides(rows)
-    ran = "" if len(rows) == len(ROBOTS) else f" (of {len(rows)})"
-    return f"{len(above)} above, {len(below)} below{ran}"
+    counts = zip(map(len, sides(rows)), ("above", "below"), strict=True)
+    told = ", ".join(f"{number} {word}" for number, word in counts if number) or "no difference found"
+    return told if len(rows) == len(ROBOTS) else f"{told} (of {len(rows)})"
 
 
 def sides(rows: Sequence[Evidence]) -> tuple[list[Evidence], list[Evidence]]:
