@@ -261,7 +261,7 @@ def test_against_what_people_run(law: str) -> None:
         low = robot.lower()
         quiet = there(*(f"{arm}-{low}-ppo-{law}" for arm in ("equal", "equal-more")))
         mine[robot] = gap(tuple(quiet), (f"as-they-come-{low}-ppo-gaussian-free-std",), "final")
-    said = dict(map(reversed, re.findall(r"(\d+) (above|below)", glued[f"{law}-usual"])))
+    said = dict(map(reversed, re.findall(r"(\d+)\s(above|below)", glued[f"{law}-usual"])))
     above, below = (int(said.get(word, 0)) for word in ("above", "below"))
     near = sum(each.near for each in mine.values())
     assert abs(above - sum(each.side > 0 for each in mine.values())) <= near

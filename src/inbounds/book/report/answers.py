@@ -142,7 +142,7 @@ def short(rows: Sequence[Evidence]) -> str:
     if not rows:
         return "not run yet"
     counts = zip(map(len, sides(rows)), ("above", "below"), strict=True)
-    told = ", ".join(f"{number} {word}" for number, word in counts if number) or "no difference found"
+    told = ", ".join(f"{number}\u00a0{word}" for number, word in counts if number) or "no difference found"
     return told if len(rows) == len(ROBOTS) else f"{told} (of {len(rows)})"
 
 
