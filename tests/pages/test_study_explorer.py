@@ -83,6 +83,28 @@ def test_answers_the_keyboard_and_speaks(page: Page, address: str) -> None:
         assert svg.get_attribute("aria-hidden") == "true" or len(label) > 30
 
 
+def test_a_view_has_an_address(page: Page, address: str) -> None:
+    explorer = opened(page, address)
+    for value in ("equal", "trpo", "area", "Ant"):
+        explorer.locator(f"input[value={value}]").click()
+    explorer.locator("input[value=gaussian]").uncheck()
+    chosen = explorer.locator("input:checked").evaluate_all("all => all.map((each) => each.value)")
+    live = explorer.locator(".explorer-live").inner_html()
+    explorer.get_by_text("Link to this view").click()
+    sent = page.url
+    page.goto("about:blank")
+    page.goto(sent)
+    page.wait_for_selector(".inbounds-study-explorer[data-state=live] .explorer-panels svg")
+    assert explorer.locator("input:checked").evaluate_all("all => all.map((each) => each.value)") == chosen
+    assert explorer.locator(".explorer-live").inner_html() == live
+    assert explorer.bounding_box()["y"] < page.viewport_size["height"]
+    page.goto(f"{address}{NAME}#study?start=nowhere&robot=Hopper")  # the same page: nothing is loaded
+    assert explorer.locator("input:checked").evaluate_all("all => all.map((each) => each.value)") == [
+        *chosen[:3],
+        "Hopper",
+    ]
+
+
 def test_what_is_missing_is_one_strip(page: Page, address: str) -> None:
     explorer = opened(page, address)
     assert not explorer.locator(".explorer-missing").is_visible()  # usual starts, PPO: nothing lacks

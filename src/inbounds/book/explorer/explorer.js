@@ -47,6 +47,7 @@ inbounds.chosen = (data, choice) => {
 
 (() => {
   const { make, draw, color, followWidth, startAll } = inbounds.page;
+  const ADDRESS = "#study?";
   const write = (x) => String(Number(x.toPrecision(3))).replace("-", "−");
 
   // At most `count` round numbers from low to high.
@@ -133,7 +134,19 @@ inbounds.chosen = (data, choice) => {
     const form = container.querySelector("form");
     const live = container.querySelector(".explorer-live");
     const place = (name) => container.querySelector(`.explorer-${name}`);
+    const link = container.closest("article") && make("a", {}, "Link to this view"); // in a notebook the address is the editor's
     let width = 0;
+
+    // Chooses what an address says; a name that it does not know stays as it was.
+    function follow() {
+      if (!link || !location.hash.startsWith(ADDRESS)) return;
+      const asked = new URLSearchParams(location.hash.slice(ADDRESS.length));
+      for (const input of form.querySelectorAll("input")) {
+        const wanted = asked.getAll(input.name).includes(input.value);
+        if (wanted || input.type === "checkbox") input.checked = wanted;
+      }
+      container.scrollIntoView();
+    }
 
     function show() {
       const answers = new FormData(form);
@@ -150,12 +163,21 @@ inbounds.chosen = (data, choice) => {
       const columns = Math.max(1, Math.floor((width + em) / (18 * em)));
       const each = Math.floor((width - (columns - 1) * em) / columns);
       place("panels").replaceChildren(...shown.panels.map((found) => panel(data, found, choice.endpoint, each)));
+      if (link) link.href = ADDRESS + new URLSearchParams(answers);
     }
 
     form.addEventListener("change", show);
     form.addEventListener("submit", (event) => event.preventDefault());
     container.querySelector(".explorer-static").hidden = true;
     live.hidden = false;
+    if (link) {
+      live.after(make("p", { class: "explorer-link" }, link));
+      addEventListener("hashchange", () => {
+        follow();
+        show();
+      });
+    }
+    follow();
     followWidth(live, (room) => {
       width = room;
       show();
