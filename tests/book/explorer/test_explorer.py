@@ -89,12 +89,11 @@ def test_an_equal_start_is_told_as_on_the_static_page(outcomes: Outcomes, data: 
         key = f"equal-{algorithm}-{endpoint}"
         if len(these) > 1:
             assert said(data, key, (law, "gaussian")) == answers.counted(these)
-        told = {
-            row["robot"]: row["told"] for row in data["rows"].get(key, []) if row["pair"] == [law, "gaussian"]
-        }
-        assert told.keys() == {row.robot for row in these}
+        shown = {row["robot"]: row for row in data["rows"].get(key, []) if row["pair"] == [law, "gaussian"]}
+        assert shown.keys() == {row.robot for row in these}
         for row in these:
-            words = told[row.robot]
+            words = shown[row.robot]["told"]
+            assert shown[row.robot]["filled"] == words.endswith(", found")
             assert words.startswith(f"{spoken(row.difference)}: ")
             found = {1: "above", -1: "below", 0: ""}[answers.sign(row)]
             assert words.partition(": ")[2].startswith(found or ("no difference found", "too small"))

@@ -220,7 +220,7 @@ def _row(place: Place) -> dict[str, Any]:
     row = place.row
     margin = MARGINS[row.endpoint][row.robot]
     gap = row.difference
-    found = row.found if isinstance(row, Compared) else row.study == 2
+    found = row.found if isinstance(row, Compared) else grade(row) == "found"
     return {
         "robot": row.robot,
         "pair": list(place.pair),
