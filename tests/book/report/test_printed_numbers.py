@@ -273,6 +273,32 @@ def test_against_what_people_run(law: str) -> None:
         as_printed(tuple(numbers), mine[robot])
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "endpoint"),
+    [("law-free", "-free-std", "final"), ("law-free-area", "-free-std", "area"), ("law-state", "", "final")],
+)
+def test_the_law_with_one_kind_of_sigma(name: str, kind: str, endpoint: str) -> None:
+    """*What happened*: the logit-normal minus a Gaussian whose σ is free, or of the state, as its own is."""
+    listed = listed_in(printed("what_happened")["glued"][name])
+    mine = {}
+    for robot in ROBOTS:
+        sides = [
+            there(*(f"{arm}-{robot.lower()}-ppo-{law}{kind}" for arm in ("equal", "equal-more")))
+            for law in ("logit-normal", "gaussian")
+        ]
+        mine[robot] = gap(tuple(sides[0]), tuple(sides[1]), endpoint)
+    compared = 0
+    for robot, p in zip(ROBOTS, holm(np.array([mine[robot].p for robot in ROBOTS])), strict=True):
+        if mine[robot].near or 0.04 < p < 0.06:
+            continue
+        compared += 1
+        for word, side in (("above", 1), ("below", -1)):
+            assert (robot in listed[word]) == (mine[robot].side == side and p < 0.05), (robot, p)
+            suggested = mine[robot].side == side and p >= 0.05
+            assert (robot in listed.get(f"suggested {word}", [])) == suggested, (robot, p)
+    assert compared >= 4
+
+
 CONTRASTS = (
     ("ppo", "logit-normal", "gaussian"),
     ("ppo", "beta", "gaussian"),
