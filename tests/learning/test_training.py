@@ -20,6 +20,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from gymnasium.vector import VectorWrapper
 from gymnasium.wrappers.vector import NormalizeReward
 
 from inbounds.learning import (
@@ -146,6 +147,27 @@ def test_what_a_wrapper_has_gathered_is_not_mixed_with_the_robots_state(tmp_path
     train(dataclasses.replace(config, epochs=2), run_dir=tmp_path, make_envs=wrapped)
     assert checkpoint.load(tmp_path / checkpoint.FILE_NAME)["collector"]["envs"] is None
     assert len(train(config, run_dir=tmp_path, make_envs=wrapped).records) == 4
+
+
+def test_a_wrapper_that_comes_later_sees_every_observation() -> None:
+    """A run begun with bare environments and resumed in wrapped ones: no observation goes round the wrapper."""
+
+    class Shifted(VectorWrapper):
+        def reset(self, **given: Any) -> Any:
+            obs, info = super().reset(**given)
+            return obs + 100, info
+
+        def step(self, actions: Any) -> Any:
+            obs, *rest = super().step(actions)
+            return obs + 100, *rest
+
+    config = small_config(normalize_obs=False, epochs=1)
+    bare = small_run(config)
+    late = Trainer(config, lambda n: Shifted(PointEnv(n)))
+    late.load_state_dict(bare.state_dict())
+    late.epoch()
+    assert late.rollout is not None
+    assert float(late.rollout.obs.min()) > 50
 
 
 def test_environments_without_state_start_new_episodes(tmp_path: Path) -> None:

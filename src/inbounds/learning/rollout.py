@@ -292,12 +292,12 @@ class Collector:
         restore_generators([stream.noise for stream in self.streams], state["noise"])
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
-        envs: Any = next((e for e in (self.envs, self.envs.unwrapped) if hasattr(e, "set_state")), None)
-        if state["envs"] is None or envs is None:
+        set_state = getattr(self.envs, "set_state", None)  # not what a wrapper wraps: it would not know
+        if state["envs"] is None or set_state is None:
             # New starts, decided by the state; their observations are seen with the statistics that have been loaded.
             self.restart([int(stream.noise.integers(2**31)) for stream in self.streams])
         else:
-            envs.set_state(state["envs"])
+            set_state(state["envs"])
             self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
 
     def _box(self) -> list[np.ndarray]:

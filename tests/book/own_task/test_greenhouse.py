@@ -30,6 +30,12 @@ def test_the_batch_is_a_sound_environment() -> None:
     assert complaints(house.GreenhouseBatch) == {}
 
 
+def test_an_integer_seeds_each_greenhouse_with_the_next() -> None:
+    envs = house.GreenhouseBatch(3)
+    first, _ = envs.reset(seed=7)
+    np.testing.assert_array_equal(envs.reset(seed=[7, 8, 9])[0], first)
+
+
 def test_a_day_lasts_a_day_and_ends_early_where_the_crop_is_lost() -> None:
     envs = house.GreenhouseBatch(2)
     envs.reset(seed=[0, 1])

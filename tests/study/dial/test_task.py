@@ -98,7 +98,8 @@ def test_seeds_are_gymnasiums() -> None:
     task = DialTask(0.5, dims=3)
     each, counted = DialEnv(task, 3), DialEnv(task, 3)
     first, _ = counted.reset(seed=4)
-    np.testing.assert_array_equal(each.reset(seed=[4, 5, 6])[0], first)
+    for seeds in ([4, 5, 6], np.array([4, 5, 6])):
+        np.testing.assert_array_equal(each.reset(seed=seeds)[0], first)
     with pytest.raises(ValueError, match="3 environments need 3 seeds, got 2"):
         each.reset(seed=[1, 2])
 

@@ -95,7 +95,9 @@ class GreenhouseBatch(VectorEnv[Any, Any, Any]):
         self.state = np.zeros((4, num_envs))  # inside, quarter, season, sky
 
     def reset(self, *, seed: Any = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
-        """Begin new days, drawn anew where a seed is given."""
+        """Begin new days, drawn anew where a seed is given; an integer seeds greenhouse i with `seed + i`."""
+        if isinstance(seed, int):
+            seed = range(seed, seed + self.num_envs)
         for i in range(self.num_envs):
             if seed is not None and seed[i] is not None:
                 self.rngs[i], _ = seeding.np_random(seed[i])

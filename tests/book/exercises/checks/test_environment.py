@@ -51,6 +51,25 @@ class Forgetful(PointEnv):
         return obs, *rest, {"final_obs": obs} if info else info
 
 
+class Coarse(PointEnv):
+    """Sound, and with so few observations that the last of an episode may well be the first of the next."""
+
+    def step(self, actions):
+        obs, *rest, info = super().step(actions)
+        if "final_obs" in info:
+            final = [None if one is None else self.seen_as(one) for one in info["final_obs"]]
+            info = info | {"final_obs": np.array([*final, None], object)[:-1]}
+        return self.seen_as(obs), *rest, info
+
+    def reset(self, *, seed=None, options=None):
+        obs, info = super().reset(seed=seed, options=options)
+        return self.seen_as(obs), info
+
+    @staticmethod
+    def seen_as(obs):
+        return np.sign(obs) * [1, 1, 0]
+
+
 class Silent(PointEnv):
     def step(self, actions):
         return *super().step(actions)[:-1], {}
@@ -92,6 +111,10 @@ BROKEN = {
 def test_a_sound_environment_passes(make: Callable) -> None:
     assert complaints(make) == {}
     assert graders.own_environment(make).passed is True
+
+
+def test_a_coincidence_is_no_fault() -> None:
+    assert "final observation" not in complaints(Coarse)
 
 
 @pytest.mark.slow
