@@ -43,8 +43,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "a test does not wait for its seeds",
         "study/second/primary.py",
-        "        if whole\n        else float",
-        "        if True\n        else float",
+        "tested=whole",
+        "tested=True",
         "tests/study/second/test_analysis.py::test_a_secondary_test_waits_for_its_seeds_too",
     ),
     Mutant(
@@ -988,8 +988,8 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "intervals of the primary comparison are not expanded",
         "study/second/primary.py",
-        'statistic="mean", resamples=RESAMPLES',
-        'statistic="mean", method="percentile", resamples=RESAMPLES',
+        'statistic="mean", resamples=resamples',
+        'statistic="mean", method="percentile", resamples=resamples',
         "tests/study/second/test_independent.py::test_the_primary_comparison",
     ),
     Mutant(

@@ -216,6 +216,15 @@ def test_weights_of_the_iqm_are_repetitions(pairs: list[tuple[float, int]]) -> N
         assert statistics.interquartile_mean(values, counts) == pytest.approx(repeated, rel=1e-9, abs=1e-9)
 
 
+def test_many_sets_of_weights_are_as_one_by_one() -> None:
+    values, weights = rng().normal(size=12).round(), rng(1).multinomial(12, np.full(12, 1 / 12), size=7)
+    one_by_one = [statistics.interquartile_mean(values, each).item() for each in weights]
+    assert statistics.interquartile_mean(values, weights).tolist() == one_by_one
+    spread_out = statistics.interquartile_mean(np.broadcast_to(values, weights.shape), weights)
+    assert spread_out.tolist() == one_by_one
+    assert statistics.interquartile_mean(values, 2.0) == statistics.interquartile_mean(values, np.ones(12))
+
+
 def test_the_percentile_interval_is_that_of_scipy() -> None:
     scores = rng().gamma(2.0, size=10)
     ours = statistics.bootstrap(scores, rng(1), statistic="mean", method="percentile", resamples=40_000)

@@ -6,6 +6,7 @@ both sides are there; before that a row has its estimate and no verdict.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +16,7 @@ from inbounds.study import statistics
 from inbounds.study.analysis import generator_for, marked
 from inbounds.study.cell import ROBOTS, SECOND_VERSION
 from inbounds.study.grid import FREE
-from inbounds.study.outcomes import Column, Floats, Outcomes
+from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.second.pooled import is_whole, pooled, pooled_scores
 from inbounds.study.second.yardsticks import ENDPOINTS, MARGINS
 from inbounds.study.statistics import Estimate
@@ -116,16 +117,9 @@ def gap(
     A test of which a seed is still to be run has an estimate and no p-value: in a correction it keeps its place, like
     one whose cells are missing.
     """
-    place = (outcomes, first, second, robot, endpoint)
     whole = are_whole(outcomes, first, second, robot)
-    if (found := _both(*place, without_diverged=without_diverged)) is None:
-        return Gap(None, float("nan"), whole)
-    estimate, sides, rng = found
-    p_value = (
-        statistics.permutation_test(*sides, rng, permutations=PERMUTATIONS, missing="exclude")
-        if whole
-        else float("nan")
-    )
+    place = (outcomes, first, second, robot, endpoint)
+    estimate, p_value = _compared(*place, without_diverged=without_diverged, tested=whole)
     return Gap(estimate, p_value, whole)
 
 
@@ -138,11 +132,10 @@ def pooled_difference(
     outcomes: Outcomes, first: Column, second: Column, robot: str, endpoint: str
 ) -> Estimate | None:
     """Return the difference of `gap` without its test, which takes most of the time; None where a cell is missing."""
-    found = _both(outcomes, first, second, robot, endpoint)
-    return None if found is None else found[0]
+    return _compared(outcomes, first, second, robot, endpoint, tested=False)[0]
 
 
-def _both(
+def _compared(
     outcomes: Outcomes,
     first: Column,
     second: Column,
@@ -150,20 +143,39 @@ def _both(
     endpoint: str,
     *,
     without_diverged: bool = False,
-) -> tuple[Estimate, tuple[Floats, Floats], np.random.Generator] | None:
-    """Return a difference, the seeds' scores of both sides, and the generator that has drawn its resamples."""
+    tested: bool,
+) -> tuple[Estimate | None, float]:
+    """Return a difference and its p-value; None where a cell is missing, NaN where it is not tested."""
     a, b = (
         pooled_scores(outcomes, column, robot, endpoint, without_diverged=without_diverged)
         for column in (first, second)
     )
     if a is None or b is None:
-        return None
-    rng = generator_for("gap", *first, *second, robot, endpoint, without_diverged, version=SECOND_VERSION)
-    estimate = statistics.difference(a, b, rng, statistic="mean", resamples=RESAMPLES, missing="exclude")
+        return None, float("nan")
+    name = (*first, *second, robot, endpoint, without_diverged)
+    permutations = PERMUTATIONS if tested else 0
+    estimate, p_value = _of_scores(tuple(a), tuple(b), name, RESAMPLES, permutations)
     if not without_diverged:
         cells = [cell for column in (first, second) for cell in pooled(outcomes, column, robot)]
         estimate = marked(estimate, *cells)
-    return estimate, (a, b), rng
+    return estimate, p_value
+
+
+@functools.cache
+def _of_scores(
+    first: tuple[float, ...],
+    second: tuple[float, ...],
+    name: tuple[str | bool, ...],
+    resamples: int,
+    permutations: int,
+) -> tuple[Estimate, float]:
+    """Kept, for a page asks for most of them twice; the name decides what is drawn. No permutations, no p-value."""
+    sides = np.array(first), np.array(second)
+    rng = generator_for("gap", *name, version=SECOND_VERSION)
+    estimate = statistics.difference(*sides, rng, statistic="mean", resamples=resamples, missing="exclude")
+    if not permutations:
+        return estimate, float("nan")
+    return estimate, statistics.permutation_test(*sides, rng, permutations=permutations, missing="exclude")
 
 
 def primary(outcomes: Outcomes, *, without_diverged: bool = False) -> list[PrimaryRow]:

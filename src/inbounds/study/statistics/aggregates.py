@@ -98,7 +98,7 @@ def aggregate(
     if statistic == "mean":
         replicates, value = shares @ pooled / len(kept), weight @ pooled / len(kept)
     else:
-        replicates = interquartile_mean(np.broadcast_to(pooled, shares.shape), shares)
+        replicates = interquartile_mean(pooled, shares)
         value = interquartile_mean(pooled, weight)
     low, high = _percentiles(replicates, level)
     return Estimate(value, low, high, min(map(len, kept.values())), lost, level, SPOKEN[statistic])

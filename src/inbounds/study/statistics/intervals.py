@@ -94,11 +94,11 @@ def interquartile_mean(values: ArrayLike, weights: ArrayLike | None = None, axis
 
     Args:
         values: finite numbers; a NaN among them makes the result NaN.
-        weights: non-negative, broadcast against the values; equal by default.
+        weights: non-negative, broadcast against the values, or `[R, n]` for values `[n]`; equal by default.
         axis: over which to average.
 
     Returns:
-        The values' shape without that axis.
+        The values' shape without that axis; `[R]` for R sets of weights.
 
     Raises:
         ValueError: nothing to average.
@@ -113,9 +113,13 @@ def interquartile_mean(values: ArrayLike, weights: ArrayLike | None = None, axis
     if weights is None:
         array, mass = np.sort(array, -1), np.full(array.shape[-1], 1 / array.shape[-1])
     else:
-        mass = np.moveaxis(np.broadcast_to(np.asarray(weights, float), np.shape(values)), axis, -1)
-        order = np.argsort(array, -1)
-        array, mass = np.take_along_axis(array, order, -1), np.take_along_axis(mass, order, -1)
+        order, mass = np.argsort(array, -1), np.asarray(weights, float)
+        if array.ndim == 1:  # sorted once for all sets of weights
+            mass = np.broadcast_to(mass, np.broadcast_shapes(mass.shape, array.shape))
+            array, mass = array[order], mass.take(order, axis=-1)
+        else:
+            mass = np.moveaxis(np.broadcast_to(mass, np.shape(values)), axis, -1)
+            array, mass = np.take_along_axis(array, order, -1), np.take_along_axis(mass, order, -1)
         mass = mass / mass.sum(-1, keepdims=True)
     upper = np.cumsum(mass, -1)
     # How much of each number's share of the distribution lies in [¼, ¾].
