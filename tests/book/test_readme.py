@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from inbounds.book.report import answers, study_pages, ways_to_act
+from inbounds.book.report import answers, secondary_tests, study_pages, ways_to_act
 from inbounds.book.report.equal_start import grade, laws, outcomes_of_both, quiet_starts
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast
@@ -83,7 +83,10 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert graded["logit-normal", "final", -1] == {"found": 1}
     assert graded["logit-normal", "area", 1] == {"found": 1}
     assert graded["logit-normal", "area", -1] == {"found": 2}
-    assert "A logit-normal ends above on none, below on 1 (found)." in said
+    alike = secondary_tests.verdicts(outcomes_of_both(outcomes), "law, σ free", "logit-normal")
+    assert alike.startswith("above on 2 of 6 robots")
+    assert "below" not in alike
+    assert "A logit-normal ends below on 1; with the Gaussian's kind of σ, above on 2 (found)." in said
 
 
 def test_the_median() -> None:
