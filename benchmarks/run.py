@@ -18,6 +18,7 @@ import platform
 import shlex
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -82,19 +83,20 @@ class Worker:
 
     def __init__(self, name: str, work: Work, core: int, python: str) -> None:
         self.name = name
+        # No pipe, which would hold up a talkative one until somebody read it.
+        self._errors = tempfile.TemporaryFile("w+", encoding="utf8", errors="replace")  # noqa: SIM115
         self._process = subprocess.Popen(
             [python, "-m", "benchmarks.worker", name, json.dumps(dataclasses.asdict(work)), f"--core={core}"],
             cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self._errors,
             text=True,
         )
 
     def ready(self) -> str | None:
         """Wait until it has warmed up; return why it cannot take part, or None."""
-        message = self._answer()
-        return message.get("unavailable")
+        return self._answer().get("unavailable")
 
     def turn(self) -> dict[str, Any]:
         """Let it train for one epoch; return what it measured, or that it is "unavailable", and why."""
@@ -108,15 +110,16 @@ class Worker:
         """End the process."""
         self._process.kill()
         self._process.communicate()
+        self._errors.close()
 
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line.endswith("\n"):  # it has ended, perhaps within a word
-            _, errors = self._process.communicate()
-            return {
-                "unavailable": errors.strip().splitlines()[-1] if errors.strip() else "it ended in silence"
-            }
+            self._process.communicate()
+            self._errors.seek(0)
+            said = self._errors.read().strip().splitlines()
+            return {"unavailable": said[-1] if said else "it ended in silence"}
         answer: dict[str, Any] = json.loads(line)
         return answer
 

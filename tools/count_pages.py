@@ -18,6 +18,7 @@ from typing import Any
 from inbounds.book.pages.cells import read_cells
 from inbounds.book.pages.contents import contents
 from inbounds.book.pages.counts import HIDDEN, Counts, count_page
+from inbounds.book.pages.programs import TAG
 
 ROOT = Path(__file__).resolve().parents[1]
 CUT = {
@@ -26,8 +27,6 @@ CUT = {
     "statements": "keep those that the book needs later; the others move to Going deeper",
     "intervals": "put them into a table or a figure",
 }
-PROGRAM = "program"
-"""Tag of the cells that make up a chapter's program: they are shown."""
 
 
 def too_much(name: str, found: Counts, budget: Mapping[str, int]) -> Iterator[str]:
@@ -47,7 +46,7 @@ def misplaced(name: str, cells: list[dict[str, Any]], longest: int) -> Iterator[
         if cell["cell_type"] == "markdown":
             following = cell["source"]
             continue
-        if PROGRAM in tags and tags & HIDDEN:
+        if TAG in tags and tags & HIDDEN:
             yield f"{name}: cell {number} is part of the program and hidden: show it"
         if re.search(r"\*\*Check it\b[^\n]*(?:\n[^\n]+)*\s*\Z", following):
             lines = len([line for line in cell["source"].splitlines() if line.strip()])

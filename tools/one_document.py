@@ -94,9 +94,9 @@ def title(found: Tag) -> str:
     return heading_of(found, "h1")
 
 
-def heading_of(found: Tag, level: str = "h2") -> str:
-    """Return the first heading of a level, as text."""
-    heading = found.find(level)
+def heading_of(found: Tag, *levels: str) -> str:
+    """Return the first heading of some levels, as text."""
+    heading = found.find(levels)
     return " ".join(heading.get_text().replace("#", "").split()) if isinstance(heading, Tag) else ""
 
 

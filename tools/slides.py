@@ -62,9 +62,7 @@ show();
 
 def section_title(section: Tag) -> str:
     """Return a section's heading without its number; of the chapter itself with it."""
-    heading = section.find(["h1", "h2", "h3", "h4"])
-    text = " ".join(heading.get_text().replace("#", "").split()) if isinstance(heading, Tag) else ""
-    return re.sub(r"^\d+(\.\d+)+\.? ", "", text)
+    return re.sub(r"^\d+(\.\d+)+\.? ", "", one_document.heading_of(section, "h1", "h2", "h3", "h4"))
 
 
 def place_of(figure: Tag) -> str:

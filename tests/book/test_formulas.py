@@ -91,3 +91,16 @@ def test_without_npm_the_pages_stay_as_they_are(folder: Path, monkeypatch: pytes
     assert formulas.write(folder) == "npm could not bring the packages: no network"
     assert (folder / "notebooks" / "page.html").read_text(encoding="utf8") == PAGE
     assert (folder / "_static" / "mathjax" / "tex-chtml.js").exists()
+
+
+def test_fonts_are_kept_after_a_build_that_was_interrupted(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "LICENSE").touch()
+    monkeypatch.setattr(formulas, "_mathjax", lambda: tmp_path)
+    left = folder / "_static" / "fonts-of-formulas"
+    left.mkdir()
+    (left / "b.woff").touch()
+    formulas._keep_fonts_only(folder / "_static")
+    assert [path.name for path in (folder / "_static" / formulas.FONTS).iterdir()] == ["a.woff"]
+    assert not left.exists()

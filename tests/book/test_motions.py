@@ -25,7 +25,6 @@ def kept() -> dict[str, np.ndarray]:
 def test_the_policies_that_were_played_are_those_that_are_shipped() -> None:
     sums = motions.about(SHIPPED)["policies"]
     outcomes = Outcomes.read(SHIPPED).and_of(AFTERWARDS)
-    assert isinstance(sums, dict)
     for name, expected in sums.items():
         (policies, *_) = SHIPPED.policy_files(outcomes.finished[name].cell)
         assert store.sha256(policies) == expected, f"{name}: python -m inbounds.book.motions"
@@ -34,6 +33,7 @@ def test_the_policies_that_were_played_are_those_that_are_shipped() -> None:
 def test_a_changed_file_is_not_read(tmp_path: Path) -> None:
     folder = StudyFolder(tmp_path, tmp_path / "runs")
     shutil.copy(SHIPPED.results / store.CHECKSUMS_FILE, tmp_path)
+    (tmp_path / "policies").symlink_to(SHIPPED.results / "policies")
     data = bytearray(motions.motions_file(SHIPPED).read_bytes())
     motions.motions_file(folder).write_bytes(data)
     assert motions.read(folder).keys() == motions.read(SHIPPED).keys()
@@ -46,6 +46,28 @@ def test_a_changed_file_is_not_read(tmp_path: Path) -> None:
     motions.motions_file(folder).unlink()
     with pytest.raises(
         FileNotFoundError, match=r"there is no .*: play the robots \(python -m inbounds\.book\.motions"
+    ):
+        motions.read(folder)
+
+
+@pytest.mark.parametrize(
+    ("there", "said"), [(b"others", "is of other policies than"), (None, "is missing: restore it")]
+)
+def test_motions_of_other_policies_are_not_read(tmp_path: Path, there: bytes | None, said: str) -> None:
+    folder = StudyFolder(tmp_path, tmp_path / "runs")
+    for path in (SHIPPED.results / store.CHECKSUMS_FILE, motions.motions_file(SHIPPED)):
+        shutil.copy(path, tmp_path)
+    (tmp_path / "policies").mkdir()
+    for name in motions.about(SHIPPED)["policies"]:
+        path = SHIPPED.results / "policies" / f"{name}.safetensors"
+        (tmp_path / "policies" / path.name).symlink_to(path)
+    motions.read(folder)
+    replaced = tmp_path / "policies" / "standard-swimmer-ppo-beta.safetensors"
+    replaced.unlink()
+    if there is not None:
+        replaced.write_bytes(there)
+    with pytest.raises(
+        DamagedFileError, match=f"standard-swimmer-ppo-beta.*{said}|{said}.*-swimmer-ppo-beta"
     ):
         motions.read(folder)
 

@@ -1,11 +1,14 @@
 """`inbounds train --engine compiled`."""
 
 import re
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from inbounds.learning import load_policy
+from inbounds.learning import TrainConfig, load_policy
+from inbounds.learning.training import prepare
 from tests.cli.small import run, small, succeeds
 
 
@@ -19,6 +22,23 @@ def test_the_compiled_engine_says_how_long_compiling_took_and_stays_with_its_run
     assert code == 2
     assert "another configuration (--engine compiled there, autograd here)" in err
     assert "epoch 2/2" in succeeds(small(tmp_path / "run", 2, "Swimmer-v5", "--engine", "compiled"))
+
+
+def test_compiling_is_no_part_of_speed_and_time_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    waited = [0.0]
+
+    def an_hour(config: TrainConfig) -> float:
+        waited[0] = 3600.0
+        return prepare(config)
+
+    clock = SimpleNamespace(perf_counter=lambda: time.perf_counter() + waited[0])
+    monkeypatch.setattr("inbounds.cli.progress.time", clock)
+    monkeypatch.setattr("inbounds.cli.training.prepare", an_hour)
+    said = succeeds(small(tmp_path / "run", 2, "Swimmer-v5", "--engine", "compiled"))
+    assert waited == [3600.0]
+    speed, left = re.findall(r"epoch 1/2 .*  (\S+) steps/s  (\S+) left", said)[0]
+    assert float(speed.replace(",", "")) > 5
+    assert left.startswith("0:")  # of minutes
 
 
 def test_the_compiled_engine_without_numba_names_the_extra(

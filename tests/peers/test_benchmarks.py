@@ -229,6 +229,21 @@ def test_a_process_that_ends_after_its_warm_up_says_why(
     worker.close()
 
 
+def test_one_that_says_more_than_a_pipe_holds_is_not_held_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = (
+        "import signal, sys\nsignal.alarm(20)\n"  # held up, it ends by that, and has no answer
+        "print(300_000 * 'warning ', file=sys.stderr)\nprint('{\"ready\": true}', flush=True)\n"
+        "input()\nprint('{\"steps\": 7}', flush=True)\nsys.exit('enough')"
+    )
+    start = run.subprocess.Popen
+    monkeypatch.setattr(run.subprocess, "Popen", lambda _, **how: start([sys.executable, "-c", code], **how))
+    worker = run.Worker("floor", Work("Hopper-v5"), 0, sys.executable)
+    assert worker.ready() is None
+    assert worker.turn() == {"steps": 7}
+    assert worker.turn() == {"unavailable": "enough"}
+    worker.close()
+
+
 def test_the_anatomy_says_what_it_takes_where_nothing_can_be_pinned(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

@@ -12,6 +12,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import safetensors
@@ -21,13 +22,15 @@ from numpy.typing import NDArray
 from inbounds import robots
 from inbounds.book.report.over_seeds import final_policies
 from inbounds.learning import TrainedPolicy, Trainer, preset
-from inbounds.learning.storage.whole_files import damaged
+from inbounds.learning.storage.run_metadata import METADATA_KEY
+from inbounds.learning.storage.whole_files import DamagedFileError, damaged
 from inbounds.study import store
 from inbounds.study.grid import AFTERWARDS, COMPARED
 from inbounds.study.ledger.untrained_returns import LOUD
 from inbounds.study.outcomes import Outcome, Outcomes
 from inbounds.study.running.provenance import provenance
 from inbounds.study.store import StudyFolder
+from inbounds.study.ways_played import of_others
 
 Floats = NDArray[np.float64]
 LEVELS: Mapping[str, float | None] = {"quiet": 0.4, "default": None, "loud": LOUD}
@@ -237,7 +240,7 @@ def publish(folder: StudyFolder) -> Path:
     about = {"policies": policies, "command": "python -m inbounds.book.motions", "session": provenance()}
     kept = {name: np.ascontiguousarray(values, np.float64) for name, values in sorted(found.items())}
     path = motions_file(folder)
-    folder.publish({path: safetensors.numpy.save(kept, {"inbounds": json.dumps(about)})})
+    folder.publish({path: safetensors.numpy.save(kept, {METADATA_KEY: json.dumps(about)})})
     return path
 
 
@@ -251,7 +254,7 @@ def read(folder: StudyFolder) -> dict[str, Floats]:
 
     Raises:
         FileNotFoundError: there is no such file.
-        DamagedFileError: it is not the one whose checksum is listed.
+        DamagedFileError: it is not the one whose checksum is listed, or is of other policies than those that are there.
 
     Example:
         >>> read(StudyFolder())["standard-swimmer-ppo-beta/fold"].shape  # in the project's folder
@@ -262,13 +265,16 @@ def read(folder: StudyFolder) -> dict[str, Floats]:
         raise FileNotFoundError(f"there is no {path}: {store.make(path)}")
     if store.sha256(path) != folder.checksums().get(path.name):
         raise damaged(path, f"it is not what {store.CHECKSUMS_FILE} lists", store.restore(path))
+    for name, sum_of_played in about(folder)["policies"].items():
+        if said := of_others(path, folder.results / "policies" / f"{name}.safetensors", sum_of_played):
+            raise DamagedFileError(said)
     return dict(safetensors.numpy.load_file(path))
 
 
-def about(folder: StudyFolder) -> dict[str, object]:
+def about(folder: StudyFolder) -> dict[str, Any]:
     """Return what the file says of itself: the sums of the policies that were played, the command, the machine."""
     with safetensors.safe_open(motions_file(folder), framework="np") as file:
-        return dict(json.loads(file.metadata()["inbounds"]))
+        return dict(json.loads(file.metadata()[METADATA_KEY]))
 
 
 if __name__ == "__main__":

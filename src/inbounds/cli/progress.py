@@ -58,7 +58,7 @@ class TrainingProgress:
         self._warnings = warnings.catch_warnings()
         self._warnings.__enter__()
         warnings.showwarning = lambda message, *_args, **_kwargs: self.say(f"warning: {message}")
-        self._recent.append((time.perf_counter(), 0))
+        self.start_clock()
         if self.moves:
             self._live.start()
         return self
@@ -68,6 +68,11 @@ class TrainingProgress:
     ) -> None:
         self._live.stop()
         self._warnings.__exit__(kind, error, trace)
+
+    def start_clock(self) -> None:
+        """Count time from here on: what came before, such as compiling, is no part of training."""
+        self._recent.clear()
+        self._recent.append((time.perf_counter(), 0))
 
     def __call__(self, trainer: Trainer, record: Record) -> None:
         """Show an epoch."""

@@ -141,6 +141,7 @@ class _Session:
                 goes_on = self.has_state or start == config.epochs
                 anew = "" if goes_on else f"; {config.env} cannot save its state, so new episodes begin"
                 progress.say(f"going on with {self.run_dir}, {_epochs(start)} done{anew}")
+            progress.start_clock()
             try:
                 with self.stop.listening(progress.say_stopping):
                     trainer = train(

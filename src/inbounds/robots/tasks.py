@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Action = NDArray[np.floating[Any]]
 
-_ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
+ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 
 
 class Task:
@@ -71,7 +71,7 @@ class Task:
     @classmethod
     def load_model(cls) -> mujoco.MjModel:
         """Return the robot's MuJoCo model, from the files that Gymnasium ships."""
-        return mujoco.MjModel.from_xml_path(str(_ASSETS / cls.xml_file))
+        return mujoco.MjModel.from_xml_path(str(ASSETS / cls.xml_file))
 
     def observe(self) -> Array:
         """Return what each robot sees now, `[N, O]`, a new array."""

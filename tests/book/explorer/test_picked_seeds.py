@@ -154,6 +154,23 @@ def test_it_says_what_the_chapter_says_of_three_seeds(outcomes: Outcomes) -> Non
     assert len(alt) < len(caption) / 3  # what stands beside the picture is not read twice
 
 
+def test_the_caption_is_of_any_pair_and_any_number_of_seeds(
+    outcomes: Outcomes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row, (first, second) = next(
+        (row, sides) for row, sides in pairs(outcomes) if row.contrast[2:] == ("beta", "gaussian")
+    )
+    monkeypatch.setattr(module, "TICKED", 2)
+    monkeypatch.setattr(module, "reports", lambda *sides: reports(*sides, (2, 2)))
+    for sides, whole in (
+        ((first[:5], second[:5]), "all 5 seeds"),
+        ((first[:5], second[:4]), "all 5 and 4 seeds"),
+    ):
+        said = module._static(row, sides)
+        assert "ways to take 2 seeds of each family report, Beta minus Gaussian on" in said
+        assert f"at that of {whole}." in said
+
+
 def test_the_element_is_small_and_carries_its_scripts_only_in_a_notebook(
     outcomes: Outcomes, monkeypatch: pytest.MonkeyPatch
 ) -> None:

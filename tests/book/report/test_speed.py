@@ -230,9 +230,12 @@ def test_without_the_source_tree_the_error_says_what_to_do(
         speed.ratio_table(results)
 
 
-def test_the_path_is_left_as_it_was(results: Any) -> None:
+@pytest.mark.parametrize("first", [[], [str(speed.ROOT)]])
+def test_the_path_is_left_as_it_was(results: Any, monkeypatch: pytest.MonkeyPatch, first: list[str]) -> None:
+    """Also where it begins with the source tree, as in `python -m`."""
     import sys
 
-    before = list(sys.path)
+    before = first + sys.path
+    monkeypatch.setattr(sys, "path", list(before))
     speed.ratio_table(results)
     assert sys.path == before

@@ -20,7 +20,7 @@ from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study, store
 from inbounds.study.grid import select
-from inbounds.study.running import many_cells
+from inbounds.study.running import cluster, many_cells
 from inbounds.study.running.attempts import RETRIES, CellReport
 from inbounds.study.running.cell_lock import CellLock, read_claim
 from inbounds.study.running.many_cells import commit_cell
@@ -290,6 +290,38 @@ def test_a_cell_that_cannot_be_looked_at_is_reported(tmp_path: Path) -> None:
     )
     assert "not yours: choose other folders" in said
     assert "0 ['failed', 'finished', 'finished']" in said
+
+
+@pytest.mark.slow
+def test_a_full_disk_stops_a_cluster_as_it_stops_a_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    begun: list[str] = []
+
+    def attempt(cell: Cell, folder: StudyFolder, stop: Callable[[], bool], deadline: float) -> CellReport:
+        begun.append(cell.id)
+        if len(begun) == 1:
+            return CellReport("disk full", "make room")
+        end = time.monotonic() + 20
+        while time.monotonic() < end and not stop():
+            time.sleep(0.05)
+        return CellReport("stopped" if stop() else "never told")
+
+    monkeypatch.setattr(cluster, "attempt", attempt)
+    folder = folder_in(tmp_path)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as here:
+        summary = run_study(cells_of(1), folder, Settings(scheduler=here.scheduler_address))
+    assert sorted(report.outcome for report in summary.reports.values()) == [
+        "disk full",
+        "stopped",
+        "stopped",
+    ]
+    assert len(begun) < 3  # the second perhaps, before the word went round
+    assert summary.signal == 0
+    assert not list(folder.work.glob("stop-*"))
 
 
 def test_no_scheduler_there_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -257,6 +257,20 @@ def test_two_damaged_checkpoints_are_for_the_user(tmp_path: Path, monkeypatch: p
     assert closed == [True]
 
 
+def test_environments_are_closed_where_the_claim_is_lost_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lost(self: CellLock, **_: Any) -> None:
+        raise ClaimedError("somebody else has it")
+
+    closed = []
+    monkeypatch.setattr(MeasuredTrainer, "close", lambda self: closed.append(True))
+    monkeypatch.setattr(CellLock, "renew", lost)
+    with pytest.raises(ClaimedError, match="somebody else"):
+        run_cell(small_cell(), folder_in(tmp_path))
+    assert closed == [True]
+
+
 def test_the_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:
     folder = folder_in(tmp_path)
     run_cell(small_cell(), folder, stop=stop_after(1))

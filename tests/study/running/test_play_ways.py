@@ -240,6 +240,19 @@ def test_rows_of_other_policies_are_noticed(folder: StudyFolder) -> None:
     assert not checks.check_ways([cell], folder)[0].ok
 
 
+def test_a_damaged_evaluation_is_told_once_and_another_of_its_family_is_played(
+    folder: StudyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = [cell_of("gaussian"), dataclasses.replace(cell_of("gaussian"), arm="another")]
+    monkeypatch.setattr(checks, "evaluated", lambda *_: cells)
+    monkeypatch.setattr(checks, "wrong_evaluation", lambda cell, _: "damaged" if cell == cells[0] else "")
+    monkeypatch.setattr(checks, "check_replay", lambda cell, _: checks.Checked(cell.id, True, "played"))
+    assert checks.check_ways(cells, folder) == [
+        (f"evaluations/{cells[0].id}", False, "damaged"),
+        (cells[1].id, True, "played"),
+    ]
+
+
 def test_an_evaluation_of_other_policies_is_not_read_and_is_played_again(folder: StudyFolder) -> None:
     cell, other = cell_of("gaussian"), cell_of("logit-normal")
     expected = ways(folder, "gaussian")

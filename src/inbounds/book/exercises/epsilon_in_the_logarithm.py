@@ -22,7 +22,7 @@ def log_slope(function: Callable[..., Any]) -> Judgement:
 
     value_and_gradient.__name__ = getattr(function, "__name__", "your function")
 
-    def case(x: float, hint: str, eps: float = 0.0) -> Case:
+    def case(x: float, hint: str) -> Case:
         # 1 - tanh² = 1/cosh², and log cosh x = |x| + log(1 + exp(-2|x|)) - log 2
         exact = -2 * (abs(x) + math.log1p(math.exp(-2 * abs(x))) - math.log(2))
         slope = -2 * math.tanh(x)

@@ -183,11 +183,12 @@ def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
     first, second = (side[np.isfinite(side)] for side in sides)
     every = reports(first, second)
     names = [SHORT[family] for family in row.contrast[2:]]
+    whole = f"all {' and '.join(map(str, dict.fromkeys((len(first), len(second)))))} seeds"
     with figures.use_style():
         fig, ax = plt.subplots(figsize=(figures.WIDTH, 2.8))
         ax.hist(every.value.ravel(), bins=41, histtype="stepfilled", color="#5F6770")
         ax.axvline(0, color="#22272D", linewidth=1)
-        ax.axvline(float(row.difference.value), color="#A8330A", label="all ten seeds")
+        ax.axvline(float(row.difference.value), color="#A8330A", label=whole)
         ax.set(xlabel=f"{names[0]} − {names[1]}, difference of means [points]", ylabel="reports")
         ax.legend(loc="upper left")
     picture = base64.b64encode(svg_bytes(fig)).decode("ascii")
@@ -198,10 +199,10 @@ def _static(row: Compared, sides: Sequence[NDArray[np.float64]]) -> str:
         for key, rule in (("means", "by the two means"), ("interval", "by Welch's 95 % interval"))
     )
     caption = (
-        f"The differences that all {every.value.size} ways to take three seeds of each family report, "
-        f"{names[0].lower()} minus {names[1]} on {row.robot} under {row.contrast.algorithm.upper()}: {told}."
+        f"The differences that all {every.value.size} ways to take {TICKED} seeds of each family report, "
+        f"{names[0]} minus {names[1]} on {row.robot} under {row.contrast.algorithm.upper()}: {told}."
     )
-    alt = "Histogram of the differences, with a line at that of all ten seeds."
+    alt = f"Histogram of the differences, with a line at that of {whole}."
     return str(macros("picked_seeds").static(picture, alt, caption))
 
 

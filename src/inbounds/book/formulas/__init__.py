@@ -219,6 +219,7 @@ def _keep_fonts_only(static: Path) -> None:
     """Remove MathJax's scripts, 15 MB, that no page asks for any more; beside the fonts stays their licence."""
     fonts, kept = static / FONTS, static / "fonts-of-formulas"
     if fonts.is_dir():
+        shutil.rmtree(kept, ignore_errors=True)  # of a build that was interrupted here
         fonts.rename(kept)
         shutil.rmtree(static / "mathjax")
         fonts.parent.mkdir(parents=True)

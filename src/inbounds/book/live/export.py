@@ -24,7 +24,7 @@ from inbounds.learning.networks.actor_critic import ActorCritic
 from inbounds.learning.seeding import SeedStreams
 from inbounds.learning.updates.threads import one_thread
 from inbounds.robots.messages import install_handler
-from inbounds.robots.tasks import Task
+from inbounds.robots.tasks import ASSETS, Task
 from inbounds.robots.vector_env import TASKS
 from inbounds.study.grid import ARMS, ROBOTS, Cell
 from inbounds.study.store import StudyFolder
@@ -90,16 +90,10 @@ def robot(name: str) -> dict[str, Any]:
     joints = [model.joint(int(joint)).name for joint in model.actuator_trnid[:, 0]]
     return {
         "name": task.name,
-        "xml": (_assets() / task.xml_file).read_text(encoding="utf8"),
+        "xml": (ASSETS / task.xml_file).read_text(encoding="utf8"),
         "motors": [joint.removesuffix("_joint").replace("_", " ") for joint in joints],
         "task": {key: getattr(task, key) for key in _TASK if getattr(task, key, None) is not None},
     }
-
-
-def _assets() -> Path:
-    import gymnasium
-
-    return Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
 
 
 def policies(cell: Cell, folder: StudyFolder) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -198,7 +192,7 @@ def write(target: Path, folder: StudyFolder | None = None) -> int:
         folder: of the study; None is the one that the project ships.
 
     Returns:
-        The bytes of all policies.
+        The characters of all policies and of the networks that they began as.
     """
     folder = folder or StudyFolder.shipped()
     for part in ("robots", "policies", "starts"):

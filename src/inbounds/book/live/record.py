@@ -29,8 +29,8 @@ def steps(cell: Cell, seed: int, count: int = 50, apart: int = 7) -> Iterator[di
         count: how many steps.
         apart: env steps from one to the next.
 
-    Returns:
-        For each: the state before it (`qpos`, `qvel`, `warmstart` of the solver, `position` as last rewarded, the
+    Yields:
+        The state before it (`qpos`, `qvel`, `warmstart` of the solver, `position` as last rewarded, the
         observation `seen`), the greedy actions of the policy in it (`mean`, `median`, `mode`), the `action`
         executed, and what came of it (`obs`, `reward`, `terminated`).
 

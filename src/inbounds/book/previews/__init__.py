@@ -19,9 +19,7 @@ from inbounds.book.templates import script_json
 HERE = Path(__file__).parent
 FOLDER = "previews"  # below _static
 _LINK = re.compile(r'<a class="reference internal" href="(?P<page>[^"#:]*)#(?P<id>[^"]+)"')
-_TARGET = re.compile(
-    r'<(?P<tag>dt|div)\b(?P<attributes>[^>]*\bid="(?P<id>[^"]+)"[^>]*)>(?=(?P<rest>.?))', re.DOTALL
-)
+_TARGET = re.compile(r'<(?P<tag>dt|div)\b(?P<attributes>[^>]*\bid="(?P<id>[^"]+)"[^>]*)>')
 _KINDS = re.compile(r'\bclass="(?:proof|math|citation)\b')
 _OWN = re.compile(r"<!-- previews -->.*?<!-- /previews -->", re.DOTALL)
 

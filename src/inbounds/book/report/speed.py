@@ -322,8 +322,9 @@ def _benchmarks(name: str) -> ModuleType:
         raise ModuleNotFoundError(
             "the benchmarks are not part of the installed package: clone the project, and `pip install -e .` in it"
         )
+    before = sys.path[:]
     sys.path.append(str(ROOT))
     try:
         return importlib.import_module(f"benchmarks.{name}")
     finally:
-        sys.path.remove(str(ROOT))
+        sys.path[:] = before

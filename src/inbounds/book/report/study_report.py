@@ -45,13 +45,15 @@ HOW_TO_READ = (
 )
 
 
-def write_report(outcomes: Outcomes, path: Path, on_section: Callable[[str], object] = str) -> Path:
+def write_report(
+    outcomes: Outcomes, path: Path, on_section: Callable[[str], object] = lambda title: None
+) -> Path:
     """Write the report as one HTML file that needs no other.
 
     Args:
         outcomes: of the study.
         path: of the file; its folder is made if missing.
-        on_section: called with the title of each section, before its figures are drawn; a minute in all.
+        on_section: called with the title of each section, before its figures are drawn; some minutes in all.
 
     Returns:
         The path.

@@ -65,8 +65,6 @@ def look_at_packages(extra: str | None = None) -> Diagnosis:
     wrong, count = [], 0
     for text in metadata.requires("inbounds") or []:
         wanted = Requirement(text)
-        if wanted.name == "inbounds":  # an extra that names extras: each is looked at by itself
-            continue
         everybody = wanted.marker is None or wanted.marker.evaluate({"extra": ""})
         ours = everybody if extra is None else not everybody and _belongs(wanted, extra)
         if not ours:

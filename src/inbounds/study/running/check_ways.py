@@ -26,7 +26,7 @@ _REPLAYED = ("median-snapped",)  # falls early: the cheapest, and its actions ar
 def check_ways(
     cells: Iterable[Cell], folder: StudyFolder, on_finding: Callable[[Checked], None] = lambda finding: None
 ) -> list[Checked]:
-    """Look into the evaluations of cells, and play one of each family again.
+    """Look into the evaluations of cells, and play one of each family again, of those with which nothing is wrong.
 
     Args:
         cells: of the study; those that were not evaluated are passed over.
@@ -41,12 +41,14 @@ def check_ways(
         >>> [finding.ok for finding in check_ways(select(["standard-hopper-ppo-beta"]), StudyFolder())]
         [True]
     """
-    played, findings = evaluated(folder, cells), []
-    for cell in played:
+    sound, findings = [], []
+    for cell in evaluated(folder, cells):
         if said := wrong_evaluation(cell, folder):
             findings.append(Checked(f"evaluations/{cell.id}", False, said))
             on_finding(findings[-1])
-    first = {cell.family: cell for cell in reversed(played)}
+        else:
+            sound.append(cell)
+    first = {cell.family: cell for cell in reversed(sound)}
     for cell in first.values():
         findings.append(check_replay(cell, folder))
         on_finding(findings[-1])

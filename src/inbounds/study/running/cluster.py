@@ -19,7 +19,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
@@ -46,19 +46,21 @@ def run_on_cluster(
     stop_file = shared.work / f"stop-{os.getpid()}-{time.time_ns()}"
     signals: list[int] = []
 
+    def stop() -> None:
+        shared.work.mkdir(parents=True, exist_ok=True)
+        stop_file.touch()
+
     def take(number: int, frame: FrameType | None) -> None:
         if signals:
             raise KeyboardInterrupt
         signals.append(number)
-        shared.work.mkdir(parents=True, exist_ok=True)
-        stop_file.touch()
+        stop()
         progress.say("stopping after the epochs under way; again to leave the cluster to itself")
 
     with _client(settings.scheduler or "") as client, handling(take):
         try:
-            reports = _run(
-                client, cells, shared, (settings.nice, deadline, str(stop_file)), progress, signals
-            )
+            how = settings.nice, deadline, str(stop_file)
+            reports = _run(client, cells, shared, how, progress, signals, stop)
         finally:
             if not signals:
                 stop_file.unlink(missing_ok=True)
@@ -74,6 +76,7 @@ def _run(
     how: tuple[Any, ...],
     progress: StudyProgress,
     signals: list[int],
+    stop: Callable[[], None],
 ) -> dict[str, CellReport]:
     """Submit every cell, and again while somebody who may be dead claims it."""
     from distributed import TimeoutError as NothingYet
@@ -107,6 +110,9 @@ def _run(
             if report.outcome == "claimed" and not signals:
                 again.append((time.monotonic() + PAUSE, cell))
                 continue
+            if report.outcome == "disk full":  # for every other cell too
+                with contextlib.suppress(OSError):
+                    stop()
             reports[cell.id] = report
             progress.done(cell, report.outcome, report.message)
         now = time.monotonic()

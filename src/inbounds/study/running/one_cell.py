@@ -137,8 +137,8 @@ class _CellRun:
     def run(self, stop: Callable[[], bool], deadline: float) -> Ending:
         """Go on until the end, or until asked to stop."""
         run, epochs = self.run_, self.cell.epochs
-        self.claim.renew(epoch=run.done, epochs=epochs)
         try:
+            self.claim.renew(epoch=run.done, epochs=epochs)
             while run.done < epochs:
                 start = time.time()
                 run.epoch()

@@ -28,7 +28,7 @@ def provenance() -> dict[str, Any]:
     return {
         "commit": commit(),
         "engine": engine_digest(),
-        "versions": versions(),
+        "versions": dict(_versions()),
         "processor": processor(),
     }
 
@@ -49,6 +49,8 @@ def commit() -> str:
     """Return the commit of the source tree, with + after it if the engine has changed since; else "unknown"."""
     package = Path(inbounds.__file__).parent
     try:
+        # Fails in a repository in which the package merely lies, as one of an environment in somebody's project.
+        _git(package, "ls-files", "--error-unmatch", "__init__.py")
         head = _git(package, "rev-parse", "HEAD")
         changed = _git(package, "status", "--porcelain", "--", *ENGINE)
     except (OSError, subprocess.SubprocessError):
@@ -67,6 +69,9 @@ def processor() -> str:
     found = [re.search(rf"^{name}\s*:\s*(.*)$", text, re.MULTILINE) for name in names]
     model = "/".join(match[1].strip() for match in found if match) or platform.processor()
     return f"{platform.machine()} {model} {torch.backends.cpu.get_cpu_capability()}"
+
+
+_versions = functools.cache(versions)
 
 
 def _git(folder: Path, *args: str) -> str:
