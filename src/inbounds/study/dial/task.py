@@ -128,7 +128,9 @@ class DialEnv(VectorEnv[Any, Any, Any]):
             ValueError: there are not as many seeds as environments.
         """
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
+            if isinstance(seed, int | np.integer):
+                seed = [seed + i for i in range(self.num_envs)]
+            seeds = list(seed)
             if len(seeds) != self.num_envs:
                 raise ValueError(f"{self.num_envs} environments need {self.num_envs} seeds, got {len(seeds)}")
             for i, one in enumerate(seeds):
