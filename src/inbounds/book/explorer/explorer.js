@@ -137,15 +137,16 @@ inbounds.chosen = (data, choice) => {
     const link = container.closest("article") && make("a", {}, "Link to this view"); // in a notebook the address is the editor's
     let width = 0;
 
-    // Chooses what an address says; a name that it does not know stays as it was.
+    // Chooses what an address says, and returns whether it is one; a name that it does not know stays as it was.
     function follow() {
-      if (!link || !location.hash.startsWith(ADDRESS)) return;
+      if (!link || !location.hash.startsWith(ADDRESS)) return false;
       const asked = new URLSearchParams(location.hash.slice(ADDRESS.length));
       for (const input of form.querySelectorAll("input")) {
         const wanted = asked.getAll(input.name).includes(input.value);
         if (wanted || input.type === "checkbox") input.checked = wanted;
       }
       container.scrollIntoView();
+      return true;
     }
 
     function show() {
@@ -173,8 +174,7 @@ inbounds.chosen = (data, choice) => {
     if (link) {
       live.after(make("p", { class: "explorer-link" }, link));
       addEventListener("hashchange", () => {
-        follow();
-        show();
+        if (follow()) show(); // most changes are links to other places of the page
       });
     }
     follow();

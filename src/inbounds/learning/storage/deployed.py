@@ -1,4 +1,4 @@
-"""A policy after training as a PyTorch module, for `torch.export` and ONNX: it needs no `inbounds` where it runs."""
+"""A policy after training as a PyTorch module, for `torch.export` and ONNX: exported, it needs no `inbounds`."""
 
 from __future__ import annotations
 
