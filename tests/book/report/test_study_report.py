@@ -11,10 +11,11 @@ import pytest
 
 from inbounds.book.report import html
 from inbounds.book.report.arms import columns_of
+from inbounds.book.report.changes import changes
 from inbounds.book.report.study_report import write_report
 from inbounds.cli.studying import study
 from inbounds.study import StudyFolder, analysis
-from inbounds.study.analysis import Contrast
+from inbounds.study.analysis import ENDPOINTS, Contrast
 from inbounds.study.grid import select
 from inbounds.study.outcomes import Column, Outcomes
 from inbounds.study.statistics import Comparison, Estimate
@@ -167,11 +168,11 @@ def test_all_robots_and_some_mechanisms_are_finished(tmp_path: Path) -> None:
     assert changes[0][:2] == ["family", "final return"]
     assert [line[0] for line in changes[1:]] == ["Gaussian, clipped", "Beta", "Logit-normal"]
     assert {"Hopper, entropy 0: 3 of 3", "HalfCheetah, entropy 0: 0 of 3"} <= set(page.items)
-    later = page.table("Initial noise, asked afterwards: changed cell minus")
-    assert [line[:2] for line in later[1:]] == [["Ant", "PPO"]]  # TRPO: nothing to compare with
+    later = page.table("Initial noise, asked afterwards (Ant, PPO, ")  # TRPO: nothing to compare with
+    assert len(later) == 2
     (found,) = outcomes.and_of(select(["afterwards-ant-ppo-*"])).finished.keys() - outcomes.finished.keys()
     change = analysis.change(outcomes, outcomes.and_of(select([found])).finished[found], "final")
-    assert spoken(change) in next(line for line in later if line[0] == "Ant")
+    assert spoken(change) == later[1][1]
     assert len(page.table("Final policies by way to act")) == 1 + 18
     beyond = {row[1] for row in page.table("Endpoints (TRPO, beyond the thesis)")[1:]}
     assert beyond == {"Gaussian, clipped", "CAPG", "Beta", "Logit-normal"}
@@ -244,6 +245,36 @@ def test_the_first_word_of_a_row_heads_it() -> None:
         ("td", "", "6"),
     ]
     assert 'scope="row"' not in html.table("Caption.", ["x", "y"], [["1", "word"]], words=(1,))
+
+
+def test_changes_are_told_in_a_line_each_and_by_every_endpoint_in_a_fold(tmp_path: Path) -> None:
+    folder = folder_in(tmp_path)
+    write_cells(folder, select(["standard-hopper-ppo-*", "mechanisms-hopper-ppo-beta-entropy-*"]))
+    write_cells(folder, select(["mechanisms-hopper-ppo-gaussian-entropy-0.01", "standard-ant-ppo-gaussian"]))
+    write_cells(folder, select(["mechanisms-ant-ppo-gaussian-raw-cost"]))
+    outcomes = Outcomes.read(folder)
+
+    def told(family: str, weight: str, endpoint: str) -> str:
+        cell = outcomes.finished.get(f"mechanisms-hopper-ppo-{family}-entropy-{weight}")
+        return spoken(cell and analysis.change(outcomes, cell, endpoint))
+
+    text = changes(outcomes, "entropy").html
+    page, weights = Page(text), ("0", "0.001", "0.01")
+    assert page.table("Entropy bonus (Hopper, PPO): change of the mean final return") == [
+        ["changed", "Gaussian, clipped", "Beta"],
+        *([f"entropy {w}", told("gaussian", w, "final"), told("beta", w, "final")] for w in weights),
+    ]
+    assert told("gaussian", "0", "final") == "missing" != told("gaussian", "0.01", "final")
+    beta = [["Beta", *(told("beta", w, endpoint) for endpoint in ENDPOINTS)] for w in weights]
+    assert page.table("Entropy bonus (Hopper, PPO): changed cell minus")[1:] == [
+        *(["entropy 0"], beta[0]),
+        *(["entropy 0.001"], beta[1]),
+        *(["entropy 0.01"], ["Gaussian, clipped", *(told("gaussian", "0.01", e) for e in ENDPOINTS)]),
+        beta[2],
+    ]
+    fold = text.partition("<details>")[2].partition("</details>")[0]
+    assert fold.count('<th scope="rowgroup" colspan="4"') == fold.count("<tbody>") == 3
+    assert "<details>" not in changes(outcomes, "raw-cost").html
 
 
 def test_a_file_that_cannot_be_written_is_a_clear_line(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import compress
 
 from matplotlib.figure import Figure
 
@@ -29,50 +30,37 @@ GROUPS = {
 
 
 def changes(outcomes: Outcomes, word: str) -> Shown:
-    """Return what one group of the fourth arm's variants changes, as a figure and a table.
+    """Return what one group of the fourth arm's variants changes, as a figure and tables.
 
     Args:
         outcomes: of the study.
         word: a key of `GROUPS`.
     """
     cells = [cell for cell in ARMS["mechanisms"] if cell.variant.startswith(word)]
-    parts = _figure_and_table(outcomes, GROUPS[word], cells)
+    parts = _figure_and_tables(outcomes, GROUPS[word], cells)
     return html.of_study(f"what changes, {GROUPS[word].lower()}", *parts)
 
 
 def afterwards(outcomes: Outcomes) -> Shown:
-    """Return what the cells of `AFTERWARDS` change against those of arm 1, as a figure and a table."""
-    parts = _figure_and_table(outcomes.and_of(AFTERWARDS), "Initial noise, asked afterwards", AFTERWARDS)
+    """Return what the cells of `AFTERWARDS` change against those of arm 1, as a figure and tables."""
+    parts = _figure_and_tables(outcomes.and_of(AFTERWARDS), "Initial noise, asked afterwards", AFTERWARDS)
     return html.of_study("what changes, asked afterwards", *parts)
 
 
-def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
-    panels: dict[str, dict[str, Estimate | None]] = {}
-    names: list[dict[str, str]] = []
-    rows: list[list[str]] = []
+def _figure_and_tables(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> list[str]:
+    found: dict[str, dict[str, list[Estimate | None]]] = {}  # panel → family → endpoint by endpoint
     for cell in cells:
         outcome = outcomes.finished.get(cell.id)
-        found = {e: analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS}
-        panels.setdefault(_panel(cell), {})[cell.family] = found["final"]
-        if found["final"] is not None:
-            names.append(
-                {
-                    "robot": cell.robot,
-                    "algorithm": cell.algorithm.upper(),
-                    "family": LOOKS[cell.family].label,
-                    "change": change_name(cell.variant),
-                }
-            )
-            rows.append([spoken(estimate) for estimate in found.values()])
-    if not rows:
-        return [NONE_FINISHED]
-    counts = {panel: (sum(map(bool, row.values())), len(row)) for panel, row in panels.items()}
-    drawn = {family for row in panels.values() for family, estimate in row.items() if estimate}
+        numbers = [analysis.change(outcomes, outcome, e) if outcome else None for e in ENDPOINTS]
+        found.setdefault(_panel(cell), {})[cell.family] = numbers
+    drawn = [f for f in LOOKS if any(row.get(f, [None])[0] for row in found.values())]
     panels = {
-        panel: {family: estimate for family, estimate in row.items() if family in drawn}
-        for panel, row in panels.items()
-        if any(row.values())
+        panel: {family: numbers[0] for family, numbers in row.items() if family in drawn}
+        for panel, row in found.items()
+        if any(numbers[0] for numbers in row.values())
     }
+    if not panels:
+        return [NONE_FINISHED]
 
     def draw(narrow: bool) -> Figure:
         label = "change of the mean final return"
@@ -82,35 +70,54 @@ def _figure_and_table(outcomes: Outcomes, title: str, cells: Sequence[Cell]) -> 
         f"{panel}: " + ", ".join(f"{LOOKS[f].label} {spoken(e)}" for f, e in row.items())
         for panel, row in panels.items()
     )
-    # What all rows share is said once, in the caption: the table is wide enough.
-    told = [name for name in names[0] if len(rows) == 1 or len({each[name] for each in names}) > 1]
-    shared = [text for name, text in names[0].items() if name not in told]
+    # What all panels share is said once, in the captions.
+    shared, names = _shared_and_names(panels)
     where = f"{title} ({', '.join(shared)})" if shared else title
-    caption = f"{where}: changed cell minus cell of comparison."
-    first, last = (
-        [n for n in told if n != "change"],
-        [n for n in told if n == "change"],
-    )  # results stay in view
-    table = [
-        [*(each[name] for name in first), *row, *(each[name] for name in last)]
-        for each, row in zip(names, rows, strict=True)
-    ]
-    head = [*first, *HEADS.values(), *last]
-    words = [i for i, name in enumerate(head) if name in told]
     below = f"{where}: change of the mean final return, changed cell minus cell of comparison. {interval_note(panels)}"
-    parts = [html.figure_of(draw, alt, below), html.table(caption, head, table, words)]
+    parts = [html.figure_of(draw, alt, below), *_tables(where, names, drawn, found)]
+    counts = {panel: (sum(bool(n[0]) for n in row.values()), len(row)) for panel, row in found.items()}
     if any(done < planned for done, planned in counts.values()):
-        parts.append(html.progress(_without_shared(counts)))
+        shared, names = _shared_and_names(counts)
+        parts.append(html.progress({names[panel] or shared[0]: count for panel, count in counts.items()}))
     return parts
 
 
-def _without_shared(counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
-    """Name panels in one line, by what does not hold for all of them."""
-    names = [panel.replace("\n", ", ").split(", ") for panel in counts]
-    told = [i for i, part in enumerate(zip(*names, strict=True)) if len(set(part)) > 1] or [0]
-    return {
-        ", ".join(name[i] for i in told): count for name, count in zip(names, counts.values(), strict=True)
-    }
+def _tables(
+    where: str,
+    names: Mapping[str, str],
+    drawn: Sequence[str],
+    found: Mapping[str, Mapping[str, Sequence[Estimate | None]]],
+) -> list[str]:
+    """Return the final returns, a line each panel, and all endpoints in a fold; of one panel all at once."""
+    rows: list[list[str]] = []
+    begins: dict[int, str] = {}
+    for panel, name in names.items():
+        if name:
+            begins[len(rows)] = name
+        there = {family: numbers for family, numbers in found[panel].items() if numbers[0]}
+        rows += [[LOOKS[f].label, *map(spoken, numbers)] for f, numbers in there.items()]
+    caption = f"{where}: changed cell minus cell of comparison."
+    every = html.table(caption, ["family", *HEADS.values()], rows, parts=begins)
+    if len(names) == 1:
+        return [every]
+    lines = [
+        [name, *(spoken(found[panel][f][0]) if f in found[panel] else "" for f in drawn)]
+        for panel, name in names.items()
+    ]
+    head = ["changed", *(LOOKS[f].label for f in drawn)]
+    return [
+        html.table(f"{where}: change of the mean final return.", head, lines),
+        html.fold("Area and greedy return, too", every),
+    ]
+
+
+def _shared_and_names(panels: Iterable[str]) -> tuple[list[str], dict[str, str]]:
+    """Return what the titles of all panels share; and the rest of each in one line, which may be nothing."""
+    titles = {panel: panel.replace("\n", ", ").split(", ") for panel in panels}
+    varies = [len(set(part)) > 1 for part in zip(*titles.values(), strict=True)]
+    shared = [part for part, other in zip(next(iter(titles.values())), varies, strict=True) if not other]
+    names = {panel: ", ".join(compress(parts, varies)) for panel, parts in titles.items()}
+    return shared, names
 
 
 def _panel(cell: Cell) -> str:

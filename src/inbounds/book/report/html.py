@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
@@ -144,6 +145,7 @@ def table(
     rows: Sequence[Sequence[str]],
     words: Sequence[int] = (0,),
     anchors: Sequence[str] = (),
+    parts: Mapping[int, str] = MappingProxyType({}),
 ) -> str:
     """Return a table of plain texts.
 
@@ -153,13 +155,24 @@ def table(
         rows: each as long as the head; a text may have lines.
         words: which columns hold words rather than numbers.
         anchors: of the rows, one each, for links to them; none by default.
+        parts: the index of a row → what heads the part of the table that begins with it; one part by default.
 
     Example:
         >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
         True
     """
     kept = [[together(text) for text in row] for row in rows]
-    return str(_HTML.table(together(caption), head, kept, words, anchors))
+    return str(_HTML.table(together(caption), head, kept, words, anchors, parts))
+
+
+def fold(title: str, inside: str) -> str:
+    r"""Return HTML under a title, plain text, that shows it when it is asked to.
+
+    Example:
+        >>> fold("All of it", paragraph("x < y"))
+        '<details><summary>All of it</summary>\n<p>x &lt; y</p>\n</details>'
+    """
+    return str(_HTML.fold(title, inside))
 
 
 def with_code(text: str) -> str:
