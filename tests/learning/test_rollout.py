@@ -208,7 +208,21 @@ def test_a_readers_own_gymnasium_environment() -> None:
                 * n,
                 autoreset_mode=AutoresetMode.SAME_STEP,
             ),
-            "observations must be a Box, got Discrete.*FlattenObservation",
+            "observations must be a Box, and no images, got Discrete.*FlattenObservation",
+        ),
+        (
+            lambda n: SyncVectorEnv(
+                [
+                    lambda: gymnasium.wrappers.TransformObservation(
+                        gymnasium.make("Pendulum-v1"),
+                        lambda obs: np.zeros((8, 8, 3), np.uint8),
+                        gymnasium.spaces.Box(0, 255, (8, 8, 3), np.uint8),
+                    )
+                ]
+                * n,
+                autoreset_mode=AutoresetMode.SAME_STEP,
+            ),
+            r"no images, got Box\(0, 255, \(8, 8, 3\), uint8\).*perceptrons.*FlattenObservation.*stable-baselines3",
         ),
     ],
 )

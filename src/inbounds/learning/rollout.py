@@ -322,8 +322,8 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: Act
         mode: how the configuration treats actions beyond the box.
 
     Raises:
-        ValueError: no vector environment, another number, another autoreset mode, observations that are no Box,
-            actions that `require_box` refuses, or that they clip themselves where the mode is "raw".
+        ValueError: no vector environment, another number, another autoreset mode, observations that are no Box or are
+            images, actions that `require_box` refuses, or that they clip themselves where the mode is "raw".
     """
     if not hasattr(envs, "num_envs"):
         raise ValueError(
@@ -341,9 +341,10 @@ def check_environments(envs: VectorEnv[Any, Any, Any], num_seeds: int, mode: Act
             "autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP (by gymnasium.make_vec: with "
             'vector_kwargs={"autoreset_mode": ...})'
         )
-    if not isinstance(envs.single_observation_space, gymnasium.spaces.Box):
+    space = envs.single_observation_space
+    if not isinstance(space, gymnasium.spaces.Box) or (len(space.shape) == 3 and space.dtype == np.uint8):
         raise ValueError(
-            f"observations must be a Box, got {envs.single_observation_space}: wrap the environment "
-            "(gymnasium.wrappers.FlattenObservation) so that they are"
+            f"observations must be a Box, and no images, got {space}: the networks are perceptrons. Flatten them "
+            "(gymnasium.wrappers.FlattenObservation), or let stable-baselines3 see them (inbounds.integrations)"
         )
     require_box(envs.single_action_space)
