@@ -79,6 +79,7 @@ def play(act: Actor, make_envs: MakeEnvs, days: Sequence[int], limit: int = 100_
     Example:
         >>> import gymnasium
         >>> from gymnasium.vector import AutoresetMode, SyncVectorEnv
+        >>> from inbounds.book.own_task import constant
         >>> make = lambda: gymnasium.make("MountainCarContinuous-v0")
         >>> envs = lambda n: SyncVectorEnv([make] * n, autoreset_mode=AutoresetMode.SAME_STEP)
         >>> play(constant([0.0]), envs, [0, 1])
@@ -106,11 +107,12 @@ def best_of(
     Args:
         actors: by name.
         make_envs: as in `play`.
-        days: for choosing; whoever is chosen by them is told apart on others.
+        days: for choosing; whoever is chosen by them is compared on others.
 
     Example:
         >>> import gymnasium
         >>> from gymnasium.vector import AutoresetMode, SyncVectorEnv
+        >>> from inbounds.book.own_task import constant
         >>> make = lambda: gymnasium.make("Pendulum-v1")
         >>> envs = lambda n: SyncVectorEnv([make] * n, autoreset_mode=AutoresetMode.SAME_STEP)
         >>> still, pushed = constant([0.0]), constant([2.0])
@@ -137,6 +139,7 @@ def compare(returns: Mapping[str, Floats], rival: str) -> dict[str, tuple[Estima
         ValueError: the rival has seeds, or the days are not the same for all.
 
     Example:
+        >>> import numpy as np
         >>> rng = np.random.default_rng(0)
         >>> found = compare({"rule": rng.normal(5, 1, 40), "policies": rng.normal(7, 1, (10, 40))}, "rule")
         >>> mean, lead = found["policies"]

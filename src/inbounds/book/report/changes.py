@@ -24,7 +24,7 @@ GROUPS = {
     "raw-cost": "Cost of raw actions",
     "entropy": "Entropy bonus",
     "gamma": "Discount 0.9999",
-    "printed": "The two presets, one factor at a time",
+    "printed": "The two presets, one setting at a time",
 }
 """First word of a variant → title."""
 
