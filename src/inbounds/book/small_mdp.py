@@ -34,6 +34,8 @@ class Episodes(NamedTuple):
     """E episodes, padded to T steps with zeros; arrays `[E, T]`, or `[..., E, T]` for a batch of policies.
 
     Example:
+        >>> import numpy as np
+        >>> from inbounds.book.small_mdp import ledge
         >>> episodes = ledge().sample(lambda cell: (0.0 * cell, 0.0 * cell), (2,), 50, np.random.default_rng(0))
         >>> episodes.reward.shape, bool(episodes.alive[:, 0].all())
         ((2, 50), True)
@@ -68,6 +70,8 @@ class SmallMDP:
         ValueError: shapes do not fit, probabilities are none, or the discount is not in [0, 1).
 
     Example:
+        >>> import torch
+        >>> from inbounds.book.small_mdp import ledge
         >>> rover = ledge()
         >>> still = torch.zeros(6, dtype=torch.float64)
         >>> round(rover.performance(still, still).item(), 3)  # it never steers, and drifts
@@ -206,6 +210,7 @@ def squashed_moments(loc: Tensor, log_scale: Tensor) -> tuple[Tensor, Tensor]:
         log_scale: `[...]` log σ.
 
     Example:
+        >>> import torch
         >>> one = torch.ones(1, dtype=torch.float64)
         >>> [round(m.item(), 4) for m in squashed_moments(one, 0 * one)]
         [0.3935, 0.2882]

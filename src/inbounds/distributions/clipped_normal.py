@@ -282,6 +282,7 @@ def gaussian_kl_upper_bound(p: ClippedNormal, q: ClippedNormal) -> Tensor:
 
     Example:
         >>> from torch.distributions import kl_divergence
+        >>> from inbounds.distributions import ClippedNormal
         >>> p, q = ClippedNormal(0.0, 1.0), ClippedNormal(1.0, 1.0)
         >>> round(kl_divergence(p, q).item(), 4), round(gaussian_kl_upper_bound(p, q).item(), 4)
         (0.4674, 0.5)

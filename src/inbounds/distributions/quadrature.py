@@ -62,6 +62,7 @@ def expectation(function: Callable[[Tensor], Tensor], loc: Tensor, scale: Tensor
 
     Example:
         >>> import torch
+        >>> from inbounds.distributions.quadrature import trapezoid
         >>> loc, scale = torch.tensor([0.5, -2.0]).double(), torch.tensor([0.3, 1.5]).double()
         >>> second_moment = expectation(torch.square, loc, scale, trapezoid())  # loc² + scale²
         >>> [round(x, 6) for x in second_moment.tolist()]
@@ -172,6 +173,7 @@ def graded_trapezoid(
 
     Example:
         >>> import torch
+        >>> from inbounds.distributions.quadrature import expectation
         >>> loc, scale = torch.tensor(1.0).double(), torch.tensor(1000.0).double()
         >>> mean = expectation(torch.sigmoid, loc, scale, graded_trapezoid(loc, scale))
         >>> round(float(mean), 6)  # half, and a little to the right

@@ -256,6 +256,7 @@ def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
     """Return log B(α, β), `[...]`, for float64 α and β: to 1e-13 of the largest of its three terms, which cancel.
 
     Example:
+        >>> import torch
         >>> log_beta(torch.tensor(2.0, dtype=torch.float64), torch.tensor(3.0, dtype=torch.float64)).exp().item() * 12
         1.0
     """

@@ -32,6 +32,7 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
         ValueError: another law, or a std that no σ of it gives.
 
     Example:
+        >>> from inbounds.distributions import ClippedNormal, LogitNormal
         >>> round(quiet_scale(LogitNormal, 0.4), 3), round(quiet_scale(ClippedNormal, 0.4), 3)
         (0.946, 0.405)
     """

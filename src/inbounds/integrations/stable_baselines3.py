@@ -52,6 +52,8 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         ValueError: some bounds are not finite, not in order, or so close that no number is between them.
 
     Example:
+        >>> import numpy as np
+        >>> import torch
         >>> law = LogitNormalDistribution(np.array([0.0, -2.0]), np.array([8.0, 1.0]))
         >>> _ = law.proba_distribution(torch.zeros(1, 2), torch.zeros(2))
         >>> law.action(law.mode()).tolist()  # the middle of the box, with any σ
@@ -122,6 +124,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
 
     Example:
         >>> import gymnasium
+        >>> import numpy as np
         >>> from stable_baselines3 import PPO
         >>> model = PPO(LogitNormalPolicy, "Pendulum-v1", n_steps=64, device="cpu", seed=0).learn(64)
         >>> action, _ = model.predict(np.zeros((1000, 3), np.float32))
@@ -199,7 +202,9 @@ class LogitNormalActor(nn.Module):
         ValueError: another policy.
 
     Example:
+        >>> import torch
         >>> from stable_baselines3 import PPO
+        >>> from inbounds.integrations.stable_baselines3 import LogitNormalPolicy
         >>> model = PPO(LogitNormalPolicy, "Pendulum-v1", n_steps=64, device="cpu", seed=0)
         >>> actor, obs = LogitNormalActor(model.policy), torch.randn(5, 3)
         >>> batch = {0: torch.export.Dim("batch", min=1, max=1024)}  # else five at a time, for ever

@@ -59,6 +59,8 @@ class Latents(Distribution):
         law: of the action, batch shape `[..., A]`.
 
     Example:
+        >>> import torch
+        >>> from inbounds.distributions import LogitNormal
         >>> law = LogitNormal(torch.zeros(2), 1.0, torch.tensor([0.0, -2.0]), torch.tensor([8.0, 1.0]))
         >>> latents = Latents(law)
         >>> latents.event_shape, latents.deterministic_sample.tolist()
@@ -152,8 +154,11 @@ def bounded_actor(
             type between them, or of several axes; when it acts, a network with another number of outputs.
 
     Example:
+        >>> import torch
         >>> from tensordict import TensorDict
+        >>> from torch import nn
         >>> from torchrl.modules import NormalParamExtractor
+        >>> from inbounds.distributions import LogitNormal
         >>> network = nn.Sequential(nn.Linear(3, 4), NormalParamExtractor())
         >>> actor, acting = bounded_actor(network, LogitNormal, [0.0, -2.0], [8.0, 1.0])
         >>> batch = acting(TensorDict(observation=torch.randn(1000, 3), batch_size=[1000]))
@@ -258,7 +263,10 @@ def quiet_actor(
             above one executes less than 0.577.
 
     Example:
+        >>> import torch
         >>> from tensordict import TensorDict
+        >>> from torch import nn
+        >>> from inbounds.distributions import ScaledBeta
         >>> body = nn.Sequential(nn.Linear(3, 64), nn.Tanh())
         >>> actor, acting = quiet_actor(body, 64, ScaledBeta, [0.0, -2.0], [8.0, 1.0])
         >>> batch = acting(TensorDict(observation=torch.zeros(1, 3), batch_size=[1]))

@@ -37,6 +37,7 @@ def gae(
         Advantages and returns, `[S, T]` each.
 
     Example:
+        >>> import torch
         >>> step = torch.ones(1, 3)
         >>> never = torch.zeros(1, 3, dtype=torch.bool)
         >>> ends = torch.tensor([[False, True, False]])
@@ -63,6 +64,7 @@ def normalize_advantage(advantage: Tensor) -> Tensor:
     """Return (Â − mean)/(standard deviation + 1e-8) over the last axis alone, `[..., B]`: per seed, per minibatch.
 
     Example:
+        >>> import torch
         >>> normalize_advantage(torch.tensor([[1.0, 3.0], [10.0, 30.0]])).numpy().round(3)
         array([[-0.707,  0.707],
                [-0.707,  0.707]], dtype=float32)

@@ -34,6 +34,7 @@ class TrainConfig:
     """Everything that decides what a run does. Two runs with one configuration are the same run, bit for bit.
 
     Example:
+        >>> from inbounds.learning import TRPOConfig
         >>> config = TrainConfig("Hopper-v5", seeds=(0, 1), algorithm=TRPOConfig(max_kl=0.02))
         >>> config.algorithm_name, config.policy.family, config.epochs
         ('trpo', 'logit-normal', 500)

@@ -94,6 +94,7 @@ def clipped_surrogate(log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor,
         `[S, B]`, to be maximised.
 
     Example:
+        >>> import torch
         >>> log_ratio, advantage = torch.tensor([[0.5, 0.5]]), torch.tensor([[1.0, -1.0]])
         >>> clipped_surrogate(log_ratio, torch.zeros(1, 2), advantage, 0.2).numpy().round(3)
         array([[ 1.2  , -1.649]], dtype=float32)
@@ -114,7 +115,10 @@ def loss(networks: ActorCritic, batch: Minibatch, config: PPOConfig) -> Tensor:
         −L, a scalar.
 
     Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
+        >>> import numpy as np
+        >>> import torch
+        >>> from inbounds.learning import ActorCritic, NetworkConfig, Policy, PolicyConfig, PPOConfig
+        >>> from inbounds.learning.updates.minibatches import Minibatch
         >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
         >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
         >>> obs, latent = torch.ones(2, 64, 3), torch.zeros(2, 64, 1)
@@ -155,7 +159,7 @@ def update(
         beyond 1 ± ε.
 
     Example:
-        >>> from inbounds.learning import Trainer, preset
+        >>> from inbounds.learning import PPOConfig, Trainer, preset
         >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
         >>> rollout = trainer.collector.collect(128)
         >>> shuffles = [stream.shuffle for stream in trainer.streams]

@@ -312,6 +312,7 @@ def prepare(config: TrainConfig, make_envs: Callable[[int], Environments] | None
         How many seconds it took, some ten at first, less than one later where what is compiled can be kept.
 
     Example:
+        >>> from inbounds.learning import TrainConfig
         >>> prepare(TrainConfig("Swimmer-v5")) < 1  # nothing to compile for autograd
         True
     """

@@ -110,12 +110,12 @@ def kl_hessian_product(networks: ActorCritic, obs: Tensor) -> Product:
         The product, for v `[S, P]` in the order of `actor.theta`.
 
     Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
-        >>> policy = Policy(PolicyConfig("beta"), low=-np.ones(1), high=np.ones(1))
-        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
-        >>> product = kl_hessian_product(networks, obs=torch.ones(2, 64, 3))
+        >>> import torch
+        >>> from inbounds.learning import Trainer, preset
+        >>> networks = Trainer(preset("common", "Hopper-v5", seeds=2)).networks
+        >>> product = kl_hessian_product(networks, obs=torch.ones(2, 64, 11))
         >>> v = torch.ones_like(networks.actor.theta)
-        >>> bool((dot(v, product(v)) > 0).all())  # [S, 1] vᵀFv
+        >>> bool(((v * product(v)).sum(1) > 0).all())  # [S] vᵀFv
         True
     """
     weights = networks.actor.parameters
@@ -178,6 +178,7 @@ def conjugate_gradient(product: Product, b: Tensor, iterations: int, tolerance: 
         `[S, P]`.
 
     Example:
+        >>> import torch
         >>> matrix = torch.tensor([[2.0, 1.0], [1.0, 3.0]])
         >>> x = conjugate_gradient(lambda v: v @ matrix, torch.tensor([[3.0, 4.0], [4.0, 7.0]]), iterations=2)
         >>> x.round(decimals=3).tolist()
@@ -287,19 +288,18 @@ def natural_step(
         Steps in the order of `actor.theta`; zero where the gradient is zero.
 
     Example:
-        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
-        >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(1), high=np.ones(1))
-        >>> networks = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in (0, 1)])
-        >>> obs, latent = torch.ones(2, 64, 3), torch.linspace(-1, 1, 64).expand(2, 64)[..., None]
-        >>> log_prob = policy.law.log_prob(networks.parameters(obs), latent).detach()
-        >>> steps = Minibatch(obs, latent, log_prob, advantage=latent[..., 0], return_=log_prob)
-        >>> surrogate(networks, steps, torch.ones(2, 64), entropy_coef=0.0)[0].tolist()  # before the step ratios are 1
-        [1.0, 1.0]
-        >>> step = natural_step(networks, steps, steps.advantage, TRPOConfig(entropy_coef=0.0))
-        >>> product = damped(kl_hessian_product(networks, obs), damping=0.1)
-        >>> (dot(step, product(step)) / 2).flatten().numpy().round(4)  # as long as δ allows: ½ xᵀFx = 0.01
+        >>> from inbounds.learning import Trainer, TRPOConfig, preset, trpo
+        >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
+        >>> networks, steps = trainer.networks, trainer.collector.collect(64)
+        >>> advantage, _ = steps.advantages(gamma=0.99, gae_lambda=0.95)
+        >>> objective, _ = trpo.surrogate(networks, steps, advantage, entropy_coef=0.0)
+        >>> bool(objective.allclose(advantage.mean(1)))  # before the step ratios are 1
+        True
+        >>> step = natural_step(networks, steps, advantage, TRPOConfig(entropy_coef=0.0))
+        >>> product = trpo.damped(trpo.kl_hessian_product(networks, steps.obs), damping=0.1)
+        >>> ((step * product(step)).sum(1) / 2).numpy().round(4)  # as long as δ allows: ½ xᵀFx = 0.01
         array([0.01, 0.01], dtype=float32)
-        >>> line_search(networks, steps, steps.advantage, step, TRPOConfig()).accepted
+        >>> trpo.line_search(networks, steps, advantage, step, TRPOConfig()).accepted
         tensor([True, True])
     """
     objective, _ = surrogate(networks, steps, advantage, config.entropy_coef)

@@ -52,6 +52,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         ValueError: an argument is not one of those above.
 
     Example:
+        >>> import numpy as np
         >>> envs = RobotVectorEnv("HalfCheetah-v5", num_envs=2)
         >>> obs, info = envs.reset(seed=0)
         >>> obs, reward, terminated, truncated, info = envs.step(np.zeros((2, 6), np.float32))

@@ -95,9 +95,9 @@ def scores(outcome: Outcome, endpoint: str, *, without_diverged: bool = False) -
         ValueError: there is no such endpoint.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> scores(outcomes.finished["standard-hopper-ppo-beta"], "final").shape
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> scores(study.finished["standard-hopper-ppo-beta"], "final").shape
         (10,)
     """
     if endpoint == "final":
@@ -115,9 +115,9 @@ def curve(outcome: Outcome) -> Estimate | None:
     """Return a cell's learning curve `[E]`: mean over seeds, with a band that holds at each epoch by itself.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> band = curve(outcomes.finished["standard-hopper-ppo-beta"])
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> band = curve(study.finished["standard-hopper-ppo-beta"])
         >>> band.value.shape, bool((band.low < band.high).all())
         ((500,), True)
     """
@@ -135,9 +135,9 @@ def estimate(
     """Return mean or IQM of an endpoint over the seeds of a cell; None where fewer than two seeds have one.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> final = estimate(outcomes.finished["standard-hopper-ppo-beta"], "final")
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> final = estimate(study.finished["standard-hopper-ppo-beta"], "final")
         >>> final.n, bool(final.low < final.value < final.high)
         (10, True)
     """
@@ -152,9 +152,9 @@ def by_way(outcome: Outcome) -> dict[str, Estimate | None]:
     """Return the mean return of a cell's final policies under each way to act; empty where they were not kept.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> sorted(by_way(outcomes.finished["standard-hopper-ppo-beta"]))
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> sorted(by_way(study.finished["standard-hopper-ppo-beta"]))
         ['mean', 'median', 'mode', 'sample']
     """
     found: dict[str, Estimate | None] = {}
@@ -186,9 +186,9 @@ def differences(
         A comparison for each of the six robots; where a cell is missing, one without a difference.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> row = differences(outcomes, Contrast("standard", "ppo", "beta", "gaussian"), "final")["HalfCheetah"]
+        >>> from inbounds.study import StudyFolder, analysis, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> row = differences(study, analysis.Contrast("standard", "ppo", "beta", "gaussian"), "final")["HalfCheetah"]
         >>> bool(row.difference.low > 0), row.p_adjusted < 0.05
         (True, True)
     """
@@ -208,10 +208,10 @@ def change(outcomes: Outcomes, outcome: Outcome, endpoint: str) -> Estimate | No
     """Return how far a cell of the fourth arm is from its cell of comparison, in means; None where that is missing.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> plain = outcomes.finished["standard-hopper-ppo-beta"]
-        >>> change(outcomes, plain, "final").value.item()  # of a cell from itself
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> plain = study.finished["standard-hopper-ppo-beta"]
+        >>> change(study, plain, "final").value.item()  # of a cell from itself
         0.0
     """
     cell = outcome.cell
@@ -232,9 +232,9 @@ def references(outcomes: Outcomes) -> dict[str, tuple[float, float]]:
     Where the second does not exceed the first, no score can be normalised: see `normalized`.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> untrained, trained = references(outcomes)["HalfCheetah"]
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> untrained, trained = references(study)["HalfCheetah"]
         >>> untrained < 0 < trained
         True
     """
@@ -254,9 +254,9 @@ def normalized(
     A robot whose references are not in order is left out, as the protocol says.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> normalized(outcomes, REFERENCE, "final")["Hopper"].mean().round(6).item()
+        >>> from inbounds.study import StudyFolder, analysis, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> normalized(study, analysis.REFERENCE, "final")["Hopper"].mean().round(6).item()
         1.0
     """
     known = references(outcomes)
@@ -276,9 +276,9 @@ def aggregate(
     """Return the IQM of a column's normalised scores over all robots, None unless it is complete.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> bool(aggregate(outcomes, Column("standard", "ppo", "beta"), "final").low > 1)
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> bool(aggregate(study, outcomes.Column("standard", "ppo", "beta"), "final").low > 1)
         True
     """
     found = normalized(outcomes, column, endpoint, without_diverged=without_diverged)
@@ -295,9 +295,9 @@ def improvement(
     """Return the probability of improvement of first over second, None unless both are complete on all six robots.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> better = improvement(outcomes, Contrast("standard", "ppo", "beta", "gaussian"), "final")
+        >>> from inbounds.study import StudyFolder, analysis, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> better = improvement(study, analysis.Contrast("standard", "ppo", "beta", "gaussian"), "final")
         >>> bool(better.low > 0.5)
         True
     """
@@ -316,9 +316,9 @@ def profile(outcomes: Outcomes, column: Column, endpoint: str, thresholds: Array
     """Return the performance profile of a column's normalised scores, None unless it is complete.
 
     Example:
-        >>> from inbounds.study import StudyFolder
-        >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
-        >>> shares = profile(outcomes, Column("standard", "ppo", "beta"), "final", [0.0, 1.0]).share
+        >>> from inbounds.study import StudyFolder, outcomes
+        >>> study = outcomes.Outcomes.read(StudyFolder())  # in the project's folder
+        >>> shares = profile(study, outcomes.Column("standard", "ppo", "beta"), "final", [0.0, 1.0]).share
         >>> bool(shares.value[0] > shares.value[1])
         True
     """

@@ -82,6 +82,7 @@ class Outcome:
     """What a finished cell left.
 
     Example:
+        >>> from inbounds.study.outcomes import Outcomes
         >>> from inbounds.study.store import StudyFolder
         >>> outcome = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
         >>> outcome.returns.shape, outcome.cell.robot
@@ -154,6 +155,7 @@ class Outcome:
             ValueError: it is not.
 
         Example:
+            >>> from inbounds.study.outcomes import Outcomes
             >>> from inbounds.study.store import StudyFolder
             >>> outcome = Outcomes.read(StudyFolder()).finished["standard-hopper-ppo-beta"]  # in the project's folder
             >>> pace = outcome.pace(50)
@@ -260,6 +262,7 @@ class Outcomes:
         """Return a column's cell on a robot, None where it is not finished.
 
         Example:
+            >>> from inbounds.study.outcomes import Column
             >>> from inbounds.study.store import StudyFolder
             >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
             >>> outcomes.find(Column("standard", "ppo", "beta"), "Hopper").returns.shape

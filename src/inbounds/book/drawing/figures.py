@@ -67,6 +67,7 @@ class FamilyStyle:
     """The look of one policy family, the same throughout the book.
 
     Example:
+        >>> from inbounds.book.drawing.figures import LOOKS
         >>> LOOKS["beta"].label
         'Beta'
     """
@@ -159,6 +160,7 @@ def use_style() -> AbstractContextManager[None]:
         A context manager that restores the parameters found; ignore it to keep the style.
 
     Example:
+        >>> import matplotlib as mpl
         >>> with use_style():
         ...     mpl.rcParams["axes.grid"]
         True
@@ -206,6 +208,7 @@ def density_panels(
         The figure; densities above `MAX_DENSITY` leave it at the top.
 
     Example:
+        >>> import torch
         >>> from inbounds.distributions import LogitNormal
         >>> fig = density_panels([("wide", [("σ = 2", LogitNormal(torch.tensor(0.0), torch.tensor(2.0)))])])
         >>> [ax.get_title() for ax in fig.axes]

@@ -113,6 +113,7 @@ def show_films(films: Mapping[str, Film], *, loop: bool = False) -> VideoRow:
         RuntimeError: no ffmpeg, or mediapy is missing; the message names the fix.
 
     Example:
+        >>> import numpy as np
         >>> from inbounds.robots import Film
         >>> frames = np.zeros((10, 32, 48, 3), np.uint8)
         >>> show_films({"Gaussian": Film(frames, 25.0, 0.0), "Beta": Film(frames, 25.0, 0.0)})
@@ -168,6 +169,8 @@ def write_film(path: str | os.PathLike[str], film: Film) -> Path:
 
     Example:
         >>> import tempfile
+        >>> from pathlib import Path
+        >>> import numpy as np
         >>> from inbounds.robots import Film
         >>> black = Film(np.zeros((4, 32, 32, 3), np.uint8), fps=20, total_reward=0.0)
         >>> with tempfile.TemporaryDirectory() as folder:

@@ -70,6 +70,7 @@ def judge_cases(function: Callable[..., Any], cases: list[Case], success: str) -
         success: what to say when all is right.
 
     Example:
+        >>> from inbounds.book.exercises.judging import Case
         >>> square = Case((3.0,), 9.0, {"that is the double, not the square": 6.0})
         >>> judge_cases(lambda x: 2 * x, [square], "squares are right")
         ✗ not yet: <lambda>: that is the double, not the square

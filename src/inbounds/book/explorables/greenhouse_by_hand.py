@@ -70,6 +70,7 @@ class HandRule:
         """Return actions `[N, 2]` of observations `[N, 5]`; the rule heats or does not, it never cools.
 
         Example:
+            >>> import numpy as np
             >>> rule = HandRule(night=18.0, day=21.0)
             >>> rule.act(np.array([[17.0, 0, 0.0, 0, 0], [17.0, 0, 2.0, 0, 0]], np.float32)).tolist()
             [[4.0, 0.0], [8.0, 0.0]]
@@ -91,6 +92,8 @@ def a_day(act: Any, seed: int) -> dict[str, NDArray[np.float64]]:
         reward `[T]`.
 
     Example:
+        >>> from inbounds.book.explorables.greenhouse_by_hand import DAYS, HandRule
+        >>> from inbounds.book.own_task import greenhouse as house
         >>> day = a_day(HandRule(gain=0.0).act, DAYS["cold"])
         >>> len(day["reward"]) < house.DAY, bool(day["inside"][-1] < house.COLD)
         (True, True)

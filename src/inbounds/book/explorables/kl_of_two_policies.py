@@ -78,6 +78,7 @@ class TwoPolicies:
         """Return KL(old‖new) and KL(new‖old) of the action, in nats, exact.
 
         Example:
+            >>> from inbounds.book.explorables.kl_of_two_policies import MAPS
             >>> policies = TwoPolicies(old=(0.0, 1.0), new=(1.0, 1.0))
             >>> [round(policies.kl(family)[0], 3) for family in MAPS]
             [0.5, 0.5, 0.467]

@@ -102,6 +102,7 @@ class StoredAction:
         """The ratio at unchanged parameters, new log-density from the record, old one from the latent; it should be 1.
 
         Example:
+            >>> from inbounds.book.explorables.stored_action import FORMATS
             >>> [round(StoredAction(16.5, form=form).ratio, 3) for form in FORMATS]
             [0.0, 0.0, 0.735, 1.0]
         """

@@ -136,6 +136,7 @@ def thermostat(aim: float = 21.0, gain: float = 2.0, opens: float = 23.0) -> Act
         opens: where the vent begins to open; it is wide open 2 °C above [°C].
 
     Example:
+        >>> import numpy as np
         >>> thermostat()(np.array([[19.0, 0, 0, 0, 0], [24.0, 0, 0, 0, 0]])).tolist()
         [[4.0, 0.0], [0.0, 0.5]]
     """

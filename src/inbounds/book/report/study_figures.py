@@ -91,6 +91,8 @@ def learning_curves(
         ValueError: nothing to draw, an unknown family, or steps and returns of different lengths.
 
     Example:
+        >>> import numpy as np
+        >>> from inbounds.book.report.study_figures import Curve
         >>> from inbounds.study.statistics import learning_curve
         >>> steps, rng = 2048.0 * np.arange(1, 6), np.random.default_rng(0)
         >>> curve = Curve(steps, learning_curve(rng.normal(size=(10, 5)), rng))
@@ -167,6 +169,7 @@ def interval_panels(
         ValueError: nothing to draw, an unknown family, or an estimate that is an array.
 
     Example:
+        >>> import numpy as np
         >>> from inbounds.study.statistics import bootstrap
         >>> scores = bootstrap([1.0, 2.0, 3.0, 4.0], np.random.default_rng(0))
         >>> fig = interval_panels({"Ant-v5": {"gaussian": scores, "beta": None}})
@@ -213,6 +216,7 @@ def difference_panels(
         ValueError: nothing to draw, or an unknown family.
 
     Example:
+        >>> import numpy as np
         >>> from inbounds.study.statistics import compare
         >>> a, b = {"Ant-v5": [5.0, 6.0, 7.0]}, {"Ant-v5": [1.0, 2.0, 4.0]}
         >>> row = compare(a, b, np.random.default_rng(0))["Ant-v5"]

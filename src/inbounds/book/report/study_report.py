@@ -60,7 +60,9 @@ def write_report(
 
     Example:
         >>> import tempfile
+        >>> from pathlib import Path
         >>> from inbounds.study import StudyFolder
+        >>> from inbounds.study.outcomes import Outcomes
         >>> nothing = Outcomes.read(StudyFolder(Path("no/results")))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     "Claims" in write_report(nothing, Path(folder) / "report.html").read_text()

@@ -45,6 +45,8 @@ class BetaLaw:
     Densities and divergences are evaluated in float64: log-gamma cancels.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning.families import BETA, Limits
         >>> parameters = BETA.parameters(torch.tensor([0.0, 1000.0]), Limits())
         >>> [round(x.item(), 4) for x in parameters]  # 1 + log 2, and the cap
         [1.6931, 80.0]
@@ -108,6 +110,8 @@ def beta_entropy(parameters: BetaParameters) -> Tensor:
     """Return the entropy `[...]` of the unit action 2x − 1, in nats: `ScaledBeta.entropy` at half its cost.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning.families import BetaParameters
         >>> round(beta_entropy(BetaParameters(torch.ones(1), torch.ones(1))).item(), 4)  # uniform on [−1, 1]: log 2
         0.6931
     """

@@ -25,6 +25,7 @@ class ClippedNormalLaw(NormalLaw):
 
     Example:
         >>> import torch
+        >>> from inbounds.learning.families import CLIPPED_NORMAL, NormalParameters
         >>> standard = NormalParameters(torch.zeros(1), torch.zeros(1))
         >>> [round(CLIPPED_NORMAL.log_prob(standard, torch.tensor([z])).exp().item(), 4) for z in (1.0, 5.0)]
         [0.1587, 0.1587]

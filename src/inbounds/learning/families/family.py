@@ -32,6 +32,7 @@ class Parameters:
     """The parameters of a law, `[..., A]` each, in the order of the network's outputs; each law has names of its own.
 
     Example:
+        >>> import torch
         >>> from inbounds.learning.families import NormalParameters
         >>> loc, log_scale = NormalParameters(loc=torch.zeros(3), log_scale=torch.ones(3)).detach()
         >>> log_scale.tolist(), NormalParameters.names()

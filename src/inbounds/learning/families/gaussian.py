@@ -44,6 +44,8 @@ class NormalLaw:
     """The diagonal Normal: the law of `gaussian` and of `logit-normal`, which differ by their map alone.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning.families import NORMAL, Limits, NormalParameters
         >>> parameters = NORMAL.parameters(torch.tensor([0.0, 2.0, -20.0, 0.0]), Limits())
         >>> parameters.loc.tolist(), parameters.log_scale.tolist()
         ([0.0, 2.0], [-10.0, 0.0])
@@ -102,6 +104,8 @@ def normal_entropy(parameters: NormalParameters) -> Tensor:
     """Return Σ_A log σ + ½ log 2πe, `[...]`: the entropy of the latent Normal, in nats.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning.families import NormalParameters
         >>> round(normal_entropy(NormalParameters(torch.zeros(2), torch.zeros(2))).item(), 4)  # log 2πe
         2.8379
     """

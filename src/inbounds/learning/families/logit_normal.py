@@ -36,6 +36,9 @@ def logit_normal_entropy(parameters: NormalParameters) -> Tensor:
     exact to the last bit. Differentiable once.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning.families import NormalParameters
+        >>> from inbounds.learning.families.gaussian import normal_entropy
         >>> narrow = NormalParameters(torch.zeros(1), torch.full((1,), -4.0))  # at 0 the map halves lengths
         >>> round((normal_entropy(narrow) - logit_normal_entropy(narrow)).item(), 3)  # log 2
         0.693

@@ -99,6 +99,9 @@ class Policy:
             between them, or too far apart for the type.
 
     Example:
+        >>> import numpy as np
+        >>> import torch
+        >>> from inbounds.learning import PolicyConfig
         >>> policy = Policy(PolicyConfig("logit-normal"), low=np.array([-2.0]), high=np.array([4.0]))
         >>> policy.action(np.array([[0.0], [100.0]])).tolist()
         [[1.0], [4.0]]

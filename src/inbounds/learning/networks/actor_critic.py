@@ -73,7 +73,8 @@ class ActorCritic:
 
     Example:
         >>> import numpy as np
-        >>> from inbounds.learning.families.policy import PolicyConfig
+        >>> import torch
+        >>> from inbounds.learning import NetworkConfig, Policy, PolicyConfig
         >>> policy = Policy(PolicyConfig("gaussian"), low=-np.ones(2), high=np.ones(2))
         >>> nets = ActorCritic(policy, 3, NetworkConfig(), [torch.Generator().manual_seed(s) for s in range(5)])
         >>> nets.outputs(torch.zeros(5, 7, 3)).shape, nets.values(torch.zeros(5, 7, 3)).shape

@@ -25,6 +25,8 @@ class SeedAdam:
         max_grad_norm: of a seed's gradient over all networks; None never clips.
 
     Example:
+        >>> import torch
+        >>> from inbounds.learning import Mlp
         >>> network = Mlp(2, (3, 1), torch.float32)
         >>> before = network.theta.clone()
         >>> adam = SeedAdam([network], learning_rate=0.1, eps=1e-8, max_grad_norm=None)

@@ -27,6 +27,7 @@ class RunningNormalizer:
         dtype: of the observations handed out.
 
     Example:
+        >>> import numpy as np
         >>> normalizer = RunningNormalizer(num_seeds=1, obs_dim=1)
         >>> for x in (1.0, 3.0):
         ...     normalizer.update(np.array([[x]]))

@@ -93,6 +93,7 @@ class Mlp:
         dtype: of the weights, torch.float32 or torch.float64.
 
     Example:
+        >>> import torch
         >>> net = Mlp(num_seeds=10, sizes=(17, 64, 64, 12))
         >>> net.theta.shape, net(torch.zeros(10, 5, 17)).shape
         (torch.Size([10, 6092]), torch.Size([10, 5, 12]))

@@ -149,7 +149,7 @@ def config_of(curves: pa.Table) -> TrainConfig:
 
     Example:
         >>> import tempfile
-        >>> from inbounds.learning import preset, save_run, train
+        >>> from inbounds.learning import preset, read_curves, save_run, train
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     save_run(folder, train(preset("common", "Swimmer-v5", seeds=2, epochs=1)))
         ...     config_of(read_curves(folder)).seeds
@@ -202,11 +202,11 @@ def load_policies(run: str | Path, remedy: str = "") -> list[TrainedPolicy]:
 
     Example:
         >>> import tempfile
-        >>> from inbounds.learning import Trainer, preset
+        >>> from inbounds.learning import preset, save_run, train
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     save_policies(f"{folder}/{POLICIES_FILE}", Trainer(preset("common", "Hopper-v5", seeds=2)))
+        ...     save_run(folder, train(preset("common", "Swimmer-v5", seeds=2, epochs=1)))
         ...     load_policies(folder)[1]
-        <TrainedPolicy: logit-normal, ppo, Hopper-v5, seed 1>
+        <TrainedPolicy: logit-normal, ppo, Swimmer-v5, seed 1>
     """
     path = find(run, POLICIES_FILE)
     path.open("rb").close()  # safetensors says of a file that may not be read that there is none
@@ -246,7 +246,8 @@ def load_policy(run: str | Path, seed_index: int = 0) -> TrainedPolicy:
 
     Example:
         >>> import tempfile
-        >>> from inbounds.learning import preset, train
+        >>> import numpy as np
+        >>> from inbounds.learning import preset, save_run, train
         >>> run = train(preset("common", "Swimmer-v5", seeds=2, epochs=1))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     save_run(folder, run)

@@ -31,6 +31,7 @@ class TrainedPolicy:
         high: `[A]` upper bounds.
 
     Example:
+        >>> import numpy as np
         >>> from inbounds.learning import Trainer, preset
         >>> policy = Trainer(preset("common", "Hopper-v5", seeds=2)).policies[1]
         >>> policy.act(np.zeros(11)).shape, policy.act(np.zeros((5, 11)), "sample").shape
@@ -144,6 +145,7 @@ class TrainedPolicy:
             ValueError: observations of another size or not finite, or a policy that has diverged.
 
         Example:
+            >>> import numpy as np
             >>> from inbounds.learning import Trainer, preset
             >>> policy = Trainer(preset("common", "Hopper-v5", seeds=1)).policies[0]
             >>> law = policy.distribution(np.zeros((5, 11)))
@@ -171,6 +173,8 @@ class TrainedPolicy:
             ValueError: the policy has diverged, or the family does not offer that greedy action, or not as a module.
 
         Example:
+            >>> import numpy as np
+            >>> import torch
             >>> from inbounds.learning import Trainer, preset
             >>> policy = Trainer(preset("common", "Hopper-v5", seeds=1)).policies[0]
             >>> module, obs = policy.module(), torch.rand(5, 11)

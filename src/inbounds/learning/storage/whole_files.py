@@ -27,6 +27,7 @@ def is_disk_full(error: BaseException | None) -> bool:
     torch reports a write that failed half-way as a RuntimeError of its own, which has the cause as its context.
 
     Example:
+        >>> import errno
         >>> is_disk_full(OSError(errno.ENOSPC, "No space left on device")), is_disk_full(OSError(errno.EACCES, "no"))
         (True, False)
     """
@@ -88,6 +89,7 @@ def damaged(path: Path, reason: object, remedy: str = "") -> DamagedFileError:
         remedy: what to do; by default, to have the file written anew from the checkpoint.
 
     Example:
+        >>> from pathlib import Path
         >>> print(damaged(Path("curves.parquet"), "no footer.", remedy="train again"))
         curves.parquet is damaged, cut short or of another origin (no footer): train again
     """
@@ -111,6 +113,7 @@ def write_whole(path: Path, data: Any) -> None:
 
     Example:
         >>> import tempfile
+        >>> from pathlib import Path
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     write_whole(Path(folder) / "file", b"all of it")
         ...     (Path(folder) / "file").read_bytes()

@@ -17,7 +17,9 @@ class Minibatch(NamedTuple):
     """B steps of each of S seeds.
 
     Example:
+        >>> import numpy as np
         >>> from inbounds.learning import Trainer, preset
+        >>> from inbounds.learning.updates.minibatches import minibatches
         >>> rollout = Trainer(preset("common", "Hopper-v5", seeds=2)).collector.collect(64)
         >>> shuffles = [np.random.default_rng(seed) for seed in (0, 1)]
         >>> advantage, return_ = rollout.advantages(gamma=0.99, gae_lambda=0.95)

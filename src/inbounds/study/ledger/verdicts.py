@@ -244,6 +244,7 @@ def judge(outcomes: Outcomes, claim: Claim) -> Finding:
     Example:
         >>> from inbounds.study import StudyFolder
         >>> from inbounds.study.ledger import claims_named
+        >>> from inbounds.study.outcomes import Outcomes
         >>> outcomes = Outcomes.read(StudyFolder())  # in the project's folder
         >>> judge(outcomes, *claims_named(["wins-beta-standard"])).verdict
         'supported'

@@ -67,7 +67,7 @@ def run_study(
         What became of each cell.
 
     Example:
-        >>> from inbounds.study import select
+        >>> from inbounds.study import StudyFolder, select
         >>> summary = run_study(select(["standard-hopper-ppo-beta"]), StudyFolder())  # in the project's folder
         >>> summary.reports["standard-hopper-ppo-beta"].outcome
         'was finished'

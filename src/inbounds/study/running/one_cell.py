@@ -67,11 +67,13 @@ def run_cell(
 
     Example:
         >>> import tempfile
+        >>> from pathlib import Path
+        >>> from inbounds.study import Cell, StudyFolder, read_cell
         >>> small = (("horizon", 64), ("minibatch_size", 32), ("num_epochs", 1))
         >>> cell = Cell("test", "ppo", "beta", "Swimmer", seeds=(0, 1), epochs=10, overrides=small)
         >>> with tempfile.TemporaryDirectory() as name:
         ...     folder = StudyFolder(Path(name, "results"), Path(name, "work"))
-        ...     run_cell(cell, folder), run_cell(cell, folder), store.read_cell(folder.cell_file(cell)).num_rows
+        ...     run_cell(cell, folder), run_cell(cell, folder), read_cell(folder.cell_file(cell)).num_rows
         ('finished', 'was finished', 20)
     """
     if _is_finished(cell, folder):

@@ -85,6 +85,7 @@ def aggregate(
         ValueError: no environments, fewer than two seeds in one, or a senseless setting.
 
     Example:
+        >>> import numpy as np
         >>> scores = {"Hopper-v5": [0.2, 0.4, 0.6, 0.8], "Ant-v5": [0.1, 0.5, 0.5, 0.9]}
         >>> print(f"{aggregate(scores, np.random.default_rng(0)).value:.2f}")
         0.50
@@ -141,6 +142,7 @@ def probability_of_improvement(
         ValueError: the environments differ, or as `aggregate` raises.
 
     Example:
+        >>> import numpy as np
         >>> always = probability_of_improvement({"Ant-v5": [4, 5, 6]}, {"Ant-v5": [1, 2, 3]}, np.random.default_rng(0))
         >>> always.value.item(), bool(always.low < 0.7)  # three seeds prove little
         (1.0, True)
@@ -235,6 +237,7 @@ def performance_profile(
         ValueError: thresholds that are not a finite `[K]`, or as `aggregate` raises.
 
     Example:
+        >>> import numpy as np
         >>> scores = {"Hopper-v5": [0.2, 0.4, 0.6, 0.8]}
         >>> performance_profile(scores, [0.0, 0.5, 1.0], np.random.default_rng(0)).share.value.tolist()
         [1.0, 0.5, 0.0]

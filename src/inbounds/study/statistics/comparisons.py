@@ -85,6 +85,7 @@ def difference(
         ValueError: fewer than two seeds in a group, pairs of unequal number, or a senseless setting.
 
     Example:
+        >>> import numpy as np
         >>> rng = np.random.default_rng(0)
         >>> gain = difference(rng.normal(5, 1, 10), rng.normal(0, 1, 10), rng, statistic="mean")
         >>> bool(2 < gain.low < gain.value < gain.high < 8)
@@ -163,6 +164,7 @@ def permutation_test(
         ValueError: fewer than two seeds in a group, pairs of unequal number, or fewer than one permutation.
 
     Example:
+        >>> import numpy as np
         >>> permutation_test([1, 2, 3, 4], [3, 4, 1, 2], np.random.default_rng(0))  # the same means
         1.0
     """
@@ -289,6 +291,7 @@ def compare(
         TypeError: scores that are not named by environment.
 
     Example:
+        >>> import numpy as np
         >>> rng = np.random.default_rng(0)
         >>> better = {"Hopper-v5": rng.normal(9, 1, 10)}
         >>> worse = {"Hopper-v5": rng.normal(0, 1, 10), "Ant-v5": rng.normal(0, 1, 10)}

@@ -52,6 +52,7 @@ def coverage(
         A share in [0, 1].
 
     Example:
+        >>> import numpy as np
         >>> rng = np.random.default_rng(0)
         >>> coverage(lambda x: (x.mean() - 2, x.mean() + 2), lambda _: rng.normal(size=10), truth=0.0, trials=50)
         1.0

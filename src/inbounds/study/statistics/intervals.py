@@ -229,6 +229,7 @@ def bootstrap(
         ValueError: fewer than two seeds, or a setting that makes no sense.
 
     Example:
+        >>> import numpy as np
         >>> scores = [3.0, 5.0, 4.0, 6.0, 4.0, 5.0, 3.0, 7.0, 4.0, 5.0]
         >>> mean = bootstrap(scores, np.random.default_rng(0), statistic="mean")
         >>> print(f"{mean.value:.1f} in [{mean.low:.0f}, {mean.high:.0f}], n = {mean.n}")
@@ -272,6 +273,7 @@ def learning_curve(
         ValueError: the curves are not `[S, E]`, or as `bootstrap` raises.
 
     Example:
+        >>> import numpy as np
         >>> rng = np.random.default_rng(0)
         >>> curve = learning_curve(np.linspace(0, 9, 4) + rng.normal(size=(10, 4)), rng)
         >>> curve.value.shape, curve.n, bool((curve.low < curve.high).all())

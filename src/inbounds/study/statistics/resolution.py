@@ -69,6 +69,7 @@ def power(
         ValueError: a negative effect, or a setting that makes no sense.
 
     Example:
+        >>> import numpy as np
         >>> round(power(1.32, n=10, rng=np.random.default_rng(0)), 1)
         0.8
     """
@@ -105,6 +106,7 @@ def smallest_detectable_effect(
         ValueError: a chance outside (0, 1), or a setting that makes no sense.
 
     Example:
+        >>> import numpy as np
         >>> round(smallest_detectable_effect(10, np.random.default_rng(0)), 1)
         1.3
     """
