@@ -275,7 +275,12 @@ def test_against_what_people_run(law: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "kind", "endpoint"),
-    [("law-free", "-free-std", "final"), ("law-free-area", "-free-std", "area"), ("law-state", "", "final")],
+    [
+        ("law-free", "-free-std", "final"),
+        ("law-free-area", "-free-std", "area"),
+        ("law-state", "", "final"),
+        ("law-state-area", "", "area"),
+    ],
 )
 def test_the_law_with_one_kind_of_sigma(name: str, kind: str, endpoint: str) -> None:
     """*What happened*: the logit-normal minus a Gaussian whose σ is free, or of the state, as its own is."""
@@ -296,7 +301,7 @@ def test_the_law_with_one_kind_of_sigma(name: str, kind: str, endpoint: str) -> 
             assert (robot in listed[word]) == (mine[robot].side == side and p < 0.05), (robot, p)
             suggested = mine[robot].side == side and p >= 0.05
             assert (robot in listed.get(f"suggested {word}", [])) == suggested, (robot, p)
-    assert compared >= 4
+    assert compared >= (3 if name == "law-state-area" else 4)  # two p-values of 0.04
 
 
 CONTRASTS = (
