@@ -277,6 +277,17 @@ def test_changes_are_told_in_a_line_each_and_by_every_endpoint_in_a_fold(tmp_pat
     assert "<details>" not in changes(outcomes, "raw-cost").html
 
 
+def test_changes_on_several_robots_stand_below_the_robot(tmp_path: Path) -> None:
+    folder, robots = folder_in(tmp_path), ("Hopper", "HalfCheetah")
+    write_cells(folder, select([f"*-{robot.lower()}-ppo-gaussian*" for robot in robots]))
+    table = Page(changes(Outcomes.read(folder), "entropy").html).table(
+        "Entropy bonus (PPO): change of the mean"
+    )
+    weights = ["entropy 0", "entropy 0.001", "entropy 0.01"]
+    assert [row[0] for row in table] == ["changed", "HalfCheetah", *weights, "Hopper", *weights]
+    assert {len(row) for row in table} == {1, 2}
+
+
 def test_a_file_that_cannot_be_written_is_a_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

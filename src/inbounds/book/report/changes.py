@@ -100,15 +100,21 @@ def _tables(
     every = html.table(caption, ["family", *HEADS.values()], rows, parts=begins)
     if len(names) == 1:
         return [every]
-    lines = [
-        [name, *(spoken(found[panel][f][0]) if f in found[panel] else "" for f in drawn)]
-        for panel, name in names.items()
-    ]
+    parted = all(", " in name for name in names.values())  # by what they begin with, the robot
+    groups: dict[str, list[list[str]]] = {}
+    for panel, name in names.items():
+        first, rest = name.split(", ", 1) if parted else ("", name)
+        line = [spoken(found[panel][f][0]) if f in found[panel] else "" for f in drawn]
+        groups.setdefault(first, []).append([rest, *line])
+    lines: list[list[str]] = []
+    firsts: dict[int, str] = {}
+    for first, those in groups.items():
+        if first:
+            firsts[len(lines)] = first
+        lines += those
     head = ["changed", *(LOOKS[f].label for f in drawn)]
-    return [
-        html.table(f"{where}: change of the mean final return.", head, lines),
-        html.fold("Area and greedy return, too", every),
-    ]
+    final = html.table(f"{where}: change of the mean final return.", head, lines, parts=firsts)
+    return [final, html.fold("Area and greedy return, too", every)]
 
 
 def _shared_and_names(panels: Iterable[str]) -> tuple[list[str], dict[str, str]]:
