@@ -89,32 +89,23 @@ def _tables(
     found: Mapping[str, Mapping[str, Sequence[Estimate | None]]],
 ) -> list[str]:
     """Return the final returns, a line each panel, and all endpoints in a fold; of one panel all at once."""
-    rows: list[list[str]] = []
-    begins: dict[int, str] = {}
-    for panel, name in names.items():
-        if name:
-            begins[len(rows)] = name
-        there = {family: numbers for family, numbers in found[panel].items() if numbers[0]}
-        rows += [[LOOKS[f].label, *map(spoken, numbers)] for f, numbers in there.items()]
+    every = {
+        name: [[LOOKS[f].label, *map(spoken, numbers)] for f, numbers in found[panel].items() if numbers[0]]
+        for panel, name in names.items()
+    }
     caption = f"{where}: changed cell minus cell of comparison."
-    every = html.table(caption, ["family", *HEADS.values()], rows, parts=begins)
+    whole = html.parted_table(caption, ["family", *HEADS.values()], every)
     if len(names) == 1:
-        return [every]
+        return [whole]
     parted = all(", " in name for name in names.values())  # by what they begin with, the robot
-    groups: dict[str, list[list[str]]] = {}
+    lines: dict[str, list[list[str]]] = {}
     for panel, name in names.items():
         first, rest = name.split(", ", 1) if parted else ("", name)
         line = [spoken(found[panel][f][0]) if f in found[panel] else "" for f in drawn]
-        groups.setdefault(first, []).append([rest, *line])
-    lines: list[list[str]] = []
-    firsts: dict[int, str] = {}
-    for first, those in groups.items():
-        if first:
-            firsts[len(lines)] = first
-        lines += those
+        lines.setdefault(first, []).append([rest, *line])
     head = ["changed", *(LOOKS[f].label for f in drawn)]
-    final = html.table(f"{where}: change of the mean final return.", head, lines, parts=firsts)
-    return [final, html.fold("Area and greedy return, too", every)]
+    final = html.parted_table(f"{where}: change of the mean final return.", head, lines)
+    return [final, html.fold("Area and greedy return, too", whole)]
 
 
 def _shared_and_names(panels: Iterable[str]) -> tuple[list[str], dict[str, str]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
@@ -145,7 +144,6 @@ def table(
     rows: Sequence[Sequence[str]],
     words: Sequence[int] = (0,),
     anchors: Sequence[str] = (),
-    parts: Mapping[int, str] = MappingProxyType({}),
 ) -> str:
     """Return a table of plain texts.
 
@@ -155,14 +153,45 @@ def table(
         rows: each as long as the head; a text may have lines.
         words: which columns hold words rather than numbers.
         anchors: of the rows, one each, for links to them; none by default.
-        parts: the index of a row → what heads the part of the table that begins with it; one part by default.
 
     Example:
         >>> "<td>5</td>" in table("Returns.", ["robot", "mean"], [["Ant", "5"]])
         True
     """
-    kept = [[together(text) for text in row] for row in rows]
-    return str(_HTML.table(together(caption), head, kept, words, anchors, parts))
+    return _table(caption, head, {"": rows}, words, anchors)
+
+
+def parted_table(
+    caption: str,
+    head: Sequence[str],
+    parts: Mapping[str, Sequence[Sequence[str]]],
+    words: Sequence[int] = (0,),
+) -> str:
+    """Return a table of plain texts in parts, each under a heading.
+
+    Args:
+        caption: what it shows, and of how many seeds.
+        head: titles of the columns.
+        parts: heading → rows, each as long as the head; no heading where that is empty.
+        words: which columns hold words rather than numbers.
+
+    Example:
+        >>> found = {"Ant": [["Beta", "5"]], "Hopper": [["Beta", "6"]]}
+        >>> parted_table("Returns.", ["law", "mean"], found).count("<tbody>")
+        2
+    """
+    return _table(caption, head, parts, words, ())
+
+
+def _table(
+    caption: str,
+    head: Sequence[str],
+    parts: Mapping[str, Sequence[Sequence[str]]],
+    words: Sequence[int],
+    anchors: Sequence[str],
+) -> str:
+    kept = {title: [[together(text) for text in row] for row in rows] for title, rows in parts.items()}
+    return str(_HTML.table(together(caption), head, kept, words, anchors))
 
 
 def fold(title: str, inside: str) -> str:
