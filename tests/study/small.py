@@ -1,4 +1,4 @@
-"""Cells that take a second: the code is that of the real ones."""
+"""Cells that take a second: the code is that of the real ones, the robot one that soon falls."""
 
 from pathlib import Path
 from typing import Any
@@ -8,9 +8,11 @@ from inbounds.study import Cell, StudyFolder
 TINY = (("horizon", 64), ("minibatch_size", 32), ("num_epochs", 1))
 
 
-def small_cell(algorithm: str = "ppo", family: str = "gaussian", **values: Any) -> Cell:
+def small_cell(
+    algorithm: str = "ppo", family: str = "gaussian", robot: str = "Hopper", **values: Any
+) -> Cell:
     return Cell(
-        "test", algorithm, family, "Swimmer", **{"seeds": (0, 1), "epochs": 30, "overrides": TINY} | values
+        "test", algorithm, family, robot, **{"seeds": (0, 1), "epochs": 30, "overrides": TINY} | values
     )
 
 

@@ -419,7 +419,7 @@ def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with CellLock.take(folder.work_of(cells[2])):
         assert [cell_status(cell, folder) for cell in cells] == ["finished", "begun", "running"]
         Console(width=100).print(status_table(cells, folder))
-    assert re.search(r"test\s+│ Swimmer │ 1\s+│ 1\s+│ 1\s+│\s+│\s+│", capsys.readouterr().out)
+    assert re.search(r"test\s+│ Hopper │ 1\s+│ 1\s+│ 1\s+│\s+│\s+│", capsys.readouterr().out)
 
 
 def test_commit_takes_the_cell_and_nothing_else(tmp_path: Path) -> None:

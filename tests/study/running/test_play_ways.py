@@ -41,7 +41,7 @@ FAMILIES = ("gaussian", "logit-normal")
 
 
 def cell_of(family: str) -> Cell:
-    return small_cell(family=family, epochs=1, keeps_policies=True)
+    return small_cell(family=family, robot="Swimmer", epochs=1, keeps_policies=True)
 
 
 @pytest.fixture(autouse=True, scope="module")
