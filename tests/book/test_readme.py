@@ -47,14 +47,14 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert {grade(row) for row in above} == {"found"}
     assert sorted(grade(row) for row in below) == ["found", "suggested"]
     assert len(above) == 2
-    assert f"It takes PPO's Gaussian higher on 2 of {len(ppo)} robots (found)" in said
-    assert "lower on 2 (one found, one suggested)." in said
+    assert f"PPO's quiet Gaussian ends above one with σ = 1 on 2 of {len(ppo)} robots (found)" in said
+    assert "below on 2 (one found, one suggested);" in said
     (cheetah,) = answers.of(above, robot="HalfCheetah")
     assert f"on HalfCheetah by {spoken(cheetah.difference, 0)}," in said
     trpo = answers.of(final, algorithm="trpo")
     assert [(row.robot, grade(row)) for row in trpo] == [("HalfCheetah", "suggested"), ("Ant", "suggested")]
     assert len(answers.sides(trpo)[0]) == 2
-    assert "TRPO's, on HalfCheetah and Ant alone, ends higher (suggested): that tips it." in said
+    assert "TRPO's above on both that were run (suggested): 4 to 2." in said
     assert answers.start_advice(ppo) != answers.start_advice(final)
 
 
@@ -76,7 +76,7 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert not graded["beta", "final", -1]
     assert graded["beta", "area", 1] == {"found": 1, "suggested": 1}
     assert graded["beta", "area", -1] == {"suggested": 1}
-    assert "Under PPO a Beta ends above on 2 of 6 robots (found), by area below on 1 (suggested);" in said
+    assert "Under PPO a Beta ends above on 2 of 6 robots (found), but is below on 1 by area (suggested);" in said
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found": 1}
     assert graded["logit-normal", "area", 1] == {"found": 1}
@@ -89,7 +89,7 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert "below" not in alike
     assert "), below on 1 (" in by_area
     assert (
-        "a logit-normal ends below on 1, or with the Gaussian's kind of σ above on 2, by area below on 1"
+        "a logit-normal ends below on 1, with the Gaussian's kind of σ above on 2, but by area below on 1."
         in said
     )
 
