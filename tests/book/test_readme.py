@@ -4,10 +4,12 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from inbounds.book.report import answers, secondary_tests, study_pages, ways_to_act
 from inbounds.book.report.equal_start import grade, laws, outcomes_of_both, quiet_starts
+from inbounds.learning import load_policy
 from inbounds.study import grid
 from inbounds.study.analysis import Contrast
 from inbounds.study.outcomes import Outcomes
@@ -76,7 +78,9 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert not graded["beta", "final", -1]
     assert graded["beta", "area", 1] == {"found": 1, "suggested": 1}
     assert graded["beta", "area", -1] == {"suggested": 1}
-    assert "Under PPO a Beta ends above on 2 of 6 robots (found), but is below on 1 by area (suggested);" in said
+    assert (
+        "Under PPO a Beta ends above on 2 of 6 robots (found), but is below on 1 by area (suggested);" in said
+    )
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found": 1}
     assert graded["logit-normal", "area", 1] == {"found": 1}
@@ -105,12 +109,14 @@ def test_the_median() -> None:
     assert f"{fresh_noise.below} of the second's {fresh_noise.cells}, more in none (suggested)." in said
 
 
-def test_the_snippet_runs() -> None:
+def test_the_snippet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     (snippet,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
     assert "seeds=10, epochs=2)" in snippet
     names: dict[str, object] = {}
     exec(snippet.replace("seeds=10, epochs=2)", "seeds=1, epochs=1)"), names)
     assert all(abs(each) <= 1 for each in names["action"])  # type: ignore[attr-defined]
+    assert np.array_equal(load_policy("run").act([0.0] * 17, greedy="median"), names["action"])  # type: ignore[arg-type]
 
 
 def test_every_link_leads_to_a_file() -> None:

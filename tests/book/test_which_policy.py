@@ -69,12 +69,14 @@ def test_each_library_has_a_program() -> None:
     ("library", "law"),
     [*((library, "gaussian") for library in MEASURED), ("inbounds", "beta"), ("inbounds", "logit-normal")],
 )
-def test_the_program_runs_and_starts_quietly(library: str, law: str) -> None:
+def test_the_program_runs_and_starts_quietly(library: str, law: str, tmp_path: Path) -> None:
     """In a process of its own; shortened in the one number that says how long it trains."""
     program = PROGRAMS[library]
     assert library != "inbounds" or 'LAW = "gaussian"' in program
     for old, new in (SHORTER | {'LAW = "gaussian"': f'LAW = "{law}"'}).items():
         program = program.replace(old, new)
     text = f"import warnings\nwarnings.simplefilter('ignore')\n{program}\n{QUIET}\n{MEASURED[library]}"
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", text], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr[-2000:]

@@ -157,7 +157,9 @@ class Unwell(Tank):
 
 def test_what_is_not_finite_is_no_action() -> None:
     model = PPO(LogitNormalPolicy, Unwell(), n_steps=64, device="cpu")
-    with pytest.raises(ValueError, match="gives NaN or ∞: look for an observation that is not finite"):
+    with pytest.raises(
+        ValueError, match="gives NaN or ∞: look for an observation or a reward that is not finite"
+    ):
         model.learn(64)
     with pytest.raises(ValueError, match="gives NaN or ∞"):
         model.predict(np.float32([np.nan, 0]))

@@ -1,5 +1,6 @@
 """The laws of the book in TorchRL: losses read latents, environments get actions, and TanhNormal is an old friend."""
 
+import math
 import pickle
 import warnings
 
@@ -34,6 +35,17 @@ class BetaHead(nn.Module):
 
     def forward(self, outputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
         return tuple((1 + nn.functional.softplus(outputs)).chunk(2, -1))
+
+
+class Given(nn.Module):
+    """These outputs, whatever it sees."""
+
+    def __init__(self, outputs: list[float]) -> None:
+        super().__init__()
+        self.outputs = nn.Parameter(torch.tensor(outputs))
+
+    def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        return self.outputs.expand(len(seen), -1).chunk(2, -1)
 
 
 def network(law: type) -> nn.Module:
@@ -214,6 +226,26 @@ def test_a_network_of_another_size_is_refused(law: type) -> None:
     _, acting = bounded_actor(network(law), law, [-1.0, -2.0, -3.0], [1.0, 2.0, 3.0])
     with pytest.raises(ValueError, match="parameters of 2 components, and the box has 3: it needs 6 outputs"):
         acting(observations(4))
+
+
+@pytest.mark.parametrize(
+    ("law", "outputs", "wrong"),
+    [
+        (
+            LogitNormal,
+            [0.0, 0.0, 1.0, -0.1],
+            "a scale that is not positive: let it end in softplus, or take quiet_actor",
+        ),
+        (ScaledBeta, [1.0, 0.0, 1.0, 1.0], "a concentration1 that is not positive"),
+        (ScaledBeta, [1.0, 1.0, -1.0, 1.0], "a concentration0 that is not positive"),
+        (LogitNormal, [math.nan, 0.0, 1.0, 1.0], "NaN or ∞ for loc: look for an observation or a reward"),
+        (ScaledBeta, [1.0, 1.0, math.inf, 1.0], "NaN or ∞ for concentration0"),
+    ],
+)
+def test_parameters_that_make_no_law_are_refused(law: type, outputs: list[float], wrong: str) -> None:
+    _, acting = bounded_actor(Given(outputs), law, [0.0, -2.0], [8.0, 1.0])
+    with pytest.raises(ValueError, match=wrong):
+        acting(observations(5))
 
 
 def test_other_laws_are_refused() -> None:

@@ -381,6 +381,32 @@ def test_a_run_whose_seeds_all_diverge_keeps_its_end(tmp_path: Path) -> None:
     assert len(checkpoint.load(tmp_path / checkpoint.FILE_NAME)["records"]) == len(run.records) == 2
 
 
+def test_the_run_before_a_divergence_is_set_aside_and_can_be_gone_on_with(tmp_path: Path) -> None:
+    def poison(trainer: Trainer, record: Any) -> None:
+        if record["epoch"] == 0:
+            trainer.networks.actor.theta.fill_(torch.nan)
+
+    config = dataclasses.replace(small_config(epochs=3), checkpoint_every=1)
+    with (
+        pytest.warns(DivergedSeedWarning, match=r"seeds \[0, 1, 2\] diverged in epoch 1"),
+        pytest.warns(DivergedSeedWarning, match=r"before-epoch-1\.pt has the run before that epoch"),
+    ):
+        train(config, run_dir=tmp_path, make_envs=PointEnv, callback=poison)
+    with pytest.warns(DivergedSeedWarning, match="have diverged: nothing is left to train in it"):
+        assert len(train(config, run_dir=tmp_path, make_envs=PointEnv).records) == 2
+    (tmp_path / "checkpoint-before-epoch-1.pt").replace(tmp_path / checkpoint.FILE_NAME)
+    mended = train(config, run_dir=tmp_path, make_envs=PointEnv)
+    assert not mended.diverged.any()
+    assert torch.equal(weights(mended), weights(train(config, make_envs=PointEnv)))
+
+
+def test_what_can_be_no_run_directory_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for place in (tmp_path / "file", tmp_path / "file" / "run"):
+        with pytest.raises(OSError, match=f"{place} cannot be a run directory .*: choose another run_dir"):
+            train(small_config(epochs=1), run_dir=place, make_envs=PointEnv)
+
+
 def test_a_resumed_run_knows_which_seeds_have_diverged(tmp_path: Path) -> None:
     def poisoned(n: int) -> PointEnv:
         return PointEnv(n, poisoned=(1,))

@@ -320,7 +320,7 @@ def _check_bounds(name: str, low: Tensor, high: Tensor) -> None:
     complain(
         ~(torch.isfinite(low) & torch.isfinite(high)),
         "the bounds must be finite",
-        "An unbounded action needs no bounded law: use a Normal, or choose finite bounds.",
+        "Choose finite bounds; an action without bounds needs no bounded law: use a Normal.",
     )
     order = "low must be less than high"
     complain(low > high, order, "Swap the bounds.")

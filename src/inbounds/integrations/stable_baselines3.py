@@ -76,7 +76,7 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         """
         if not bool(torch.isfinite(mean_actions).all() and torch.isfinite(log_std).all()):
             raise ValueError(
-                "the policy network gives NaN or ∞: look for an observation that is not finite, "
+                "the policy network gives NaN or ∞: look for an observation or a reward that is not finite, "
                 "or take a smaller learning rate"
             )
         low, high = (bound.to(mean_actions) for bound in (self.low, self.high))

@@ -12,9 +12,12 @@ environment:
 
 `quiet_actor` makes the two with a quiet start: centred in the box, with as much executed noise as is asked for.
 
-Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: a
-NaN, or an action beyond its bounds, then raises nothing. `torch.distributions.Distribution.set_default_validate_args`
-switches them on again.
+The first is for on-policy losses, such as `ClipPPOLoss` and `A2CLoss`; the second for rollouts and collectors. A loss
+that draws actions itself, such as `SACLoss`, can use neither.
+
+Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: an
+action beyond its bounds then raises nothing. `torch.distributions.Distribution.set_default_validate_args` switches them
+on again. What the network of an actor gives is checked here all the same, but not inside `torch.compile`.
 """
 
 from __future__ import annotations
@@ -96,7 +99,7 @@ class Latents(Distribution):
         Raises:
             ValueError: always.
         """
-        raise ValueError("a mean of latents is no mean of actions: use ExplorationType.DETERMINISTIC")
+        raise ValueError("a mean of latents is no mean of actions: use ExplorationType.MEDIAN")
 
     @property
     def median(self) -> Tensor:
@@ -111,7 +114,7 @@ class Latents(Distribution):
         Raises:
             ValueError: always.
         """
-        raise ValueError("a mode of latents is no mode of actions: use ExplorationType.DETERMINISTIC")
+        raise ValueError("a mode of latents is no mode of actions: use ExplorationType.MEDIAN")
 
     @property
     def deterministic_sample(self) -> Tensor:
@@ -138,7 +141,9 @@ def bounded_actor(
     """Return a policy with bounded actions, once for the loss and once for the environment; they share the network.
 
     Args:
-        network: from what is under `in_keys` to the two parameters of `PARAMETERS[law]`, `[..., A]` each.
+        network: from what is under `in_keys` to the two parameters of `PARAMETERS[law]`, `[..., A]` each, all but
+            `loc` positive: TorchRL's `NormalParamExtractor` sees to that for a `LogitNormal`, not for a `ScaledBeta`.
+            (`quiet_actor` brings the heads of both.)
         law: `LogitNormal` or `ScaledBeta`.
         low: `[A]` lower bounds of the action, in its own units.
         high: `[A]` upper bounds.
@@ -151,7 +156,8 @@ def bounded_actor(
 
     Raises:
         ValueError: another law, or bounds that are not finite, not in order, too close for a number of the network's
-            type between them, or of several axes; when it acts, a network with another number of outputs.
+            type between them, or of several axes; when it acts, a network that gives another number of outputs, NaN,
+            ∞, or a parameter that is not positive.
 
     Example:
         >>> import torch
@@ -199,8 +205,23 @@ def _latents(law: type[LogitNormal | ScaledBeta], low: Tensor, high: Tensor, **p
             f"the network gives parameters of {first.shape[-1]} components, and the box has {low.shape[-1]}: "
             f"it needs {2 * low.shape[-1]} outputs"
         )
+    if not torch.compiler.is_compiling():  # where nothing can branch on numbers
+        _require(parameters)
     low, high = low.to(first), high.to(first)
     return Latents(law(**parameters, low=low, high=high, validate_args=False))
+
+
+def _require(parameters: Mapping[str, Tensor]) -> None:
+    for name, value in parameters.items():
+        if not torch._is_all_true(value.isfinite()):  # as torch checks, also under vmap
+            raise ValueError(
+                f"the network gives NaN or ∞ for {name}: look for an observation or a reward that is not finite, or "
+                "take a smaller learning rate"
+            )
+        if name != "loc" and not torch._is_all_true(value > 0):
+            raise ValueError(
+                f"the network gives a {name} that is not positive: let it end in softplus, or take quiet_actor"
+            )
 
 
 def _action(latent: Tensor, law: type[LogitNormal | ScaledBeta], low: Tensor, high: Tensor) -> Tensor:

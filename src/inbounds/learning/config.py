@@ -112,7 +112,9 @@ def preset(
     """Return a configuration with every number explicit.
 
     `common` is what public implementations have settled on (Engstrom et al. 2020; Andrychowicz et al. 2021; Huang et
-    al. 2022). `as-printed` is the source thesis' tables to the letter, PPO's ε = 0.02 included, and no practice that it
+    al. 2022), with three things as the first study has them: a σ that depends on the state, for the Gaussian, too; an
+    entropy bonus of 10⁻⁴; a step size that stays. Each family has its usual start: `PolicyConfig.initial_std` makes it
+    quiet. `as-printed` is the source thesis' tables to the letter, PPO's ε = 0.02 included, and no practice that it
     does not mention. What neither states (conjugate gradients, damping, line search) is the same in both.
 
     Args:

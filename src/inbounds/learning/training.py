@@ -39,8 +39,8 @@ from inbounds.learning.seeding import SeedStreams, generator_states, restore_gen
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields, describe
 from inbounds.learning.storage.trained_policy import TrainedPolicy, policies_from
-from inbounds.learning.storage.whole_files import held, remove_leftovers
-from inbounds.learning.updates.diagnostics import episode_statistics
+from inbounds.learning.storage.whole_files import claimed, remove_leftovers
+from inbounds.learning.updates.diagnostics import episode_statistics, told_of_divergence
 from inbounds.learning.updates.engine import compiled_engine
 from inbounds.learning.updates.threads import one_thread
 from inbounds.robots.registration import TASK_NAMES
@@ -148,27 +148,15 @@ class Trainer:
 
     def _mark_diverged(self, rollout: Rollout) -> list[str]:
         """Mark the seeds whose weights have just ceased to be finite; return the warnings, where that came from."""
-        told, now = [], ~self.networks.finite().numpy() & ~self.diverged
+        now = ~self.networks.finite().numpy() & ~self.diverged
         finite = rollout.obs.isfinite().all(2) & rollout.reward.isfinite() & rollout.bootstrap.isfinite()
         # [S]; the bootstrap has seen the last observations of rollout and episodes.
         received = finite.all(1).numpy()
         self.fed_nonsense |= now & ~received
-        for new, advice in (
-            (now & received, "train with a smaller learning_rate"),
-            (
-                now & ~received,
-                "mend the environment, which has returned an observation or a reward that is no finite number, or one "
-                f"too large for {self.config.network.dtype} (gymnasium.utils.env_checker.check_env looks for more)",
-            ),
-        ):
-            if new.any():
-                seeds = [seed for seed, is_new in zip(self.config.seeds, new, strict=True) if is_new]
-                told.append(
-                    f"seeds {seeds} diverged in epoch {len(self.records)}: their weights are not finite. They are "
-                    f"marked in every later record; leave them out of means, or {advice}"
-                )
         self.diverged |= now
-        return told
+        seeds = np.array(self.config.seeds)
+        groups = seeds[now & received].tolist(), seeds[now & ~received].tolist()
+        return told_of_divergence(*groups, len(self.records), self.config.network.dtype)
 
     @property
     def checkpoint_due(self) -> bool:
@@ -265,7 +253,10 @@ def train(
         ValueError: the run directory is of another configuration, or its checkpoint damaged (`DamagedFileError`).
         TypeError: the environments' state holds what a checkpoint cannot keep.
         BlockingIOError: another process or thread trains in the run directory.
-        OSError: a checkpoint could not be written, as on a full disk; the one before is kept.
+        OSError: run directory or checkpoint cannot be written, as on a full disk; the checkpoint before is kept.
+
+    Warns:
+        DivergedSeedWarning: seeds diverge, and where the checkpoint from before is kept; or all of a run have.
 
     Example:
         >>> from inbounds.learning.config import preset
@@ -279,20 +270,22 @@ def train(
         on_error.callback(trainer.envs.close)
         path = None
         if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            try:
-                stack.enter_context(held(folder))
-            except BlockingIOError as error:
-                raise BlockingIOError(
-                    f"another process or thread trains in {folder}: wait until it is done, or choose another run_dir"
-                ) from error
+            stack.enter_context(claimed(folder))
             path = folder / checkpoint.FILE_NAME
             remove_leftovers(path)
             if path.exists():
                 trainer.load_state_dict(checkpoint.load(path))
+                if trainer.diverged.all() and len(trainer.records) < trainer.config.epochs:
+                    told = f"all seeds of the run in {folder} have diverged: nothing is left to train in it"
+                    warnings.warn(told, DivergedSeedWarning, stacklevel=2)
             checkpoint.require_keepable(trainer.state_dict())
         while not trainer.finished:
+            sound = np.sum(~trainer.diverged)
             record = trainer.epoch()
+            if path is not None and path.exists() and np.sum(~trainer.diverged) < sound:
+                kept = checkpoint.set_aside(path, record["epoch"])
+                told = f"{kept} has the run before that epoch: once the environment is mended, rename it to {path.name}"
+                warnings.warn(told, DivergedSeedWarning, stacklevel=2)
             if path is not None and trainer.checkpoint_due:
                 checkpoint.save(path, trainer.state_dict())
             if callback is not None:

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from inbounds.book.own_task import my_task
+from inbounds.learning import load_policy
 
 
 def test_it_runs_as_a_file_in_another_folder(tmp_path: Path) -> None:
     copy = tmp_path / "my_task.py"
     copy.write_text(Path(my_task.__file__).read_text(encoding="utf8"), encoding="utf8")
     done = subprocess.run(
-        [sys.executable, copy, "--seeds", "2", "--epochs", "2", "--policy", "beta"],
+        [sys.executable, copy, "--seeds", "2", "--epochs", "2", "--policy", "beta", "--out", "run"],
         capture_output=True,
         text=True,
         check=True,
@@ -28,6 +29,7 @@ def test_it_runs_as_a_file_in_another_folder(tmp_path: Path) -> None:
         rf"beta, greedy +{number} \[{number}, {number}\]   {number} \[{number}, {number}\]", rows[4]
     )
     assert [row[:12].strip() for row in rows[1:3]] == ["nothing", "constant 1.5"]
+    assert 0 <= load_policy(tmp_path / "run").act(np.zeros(my_task.SEEN), greedy="median") <= 3
 
 
 def test_the_rule_is_not_at_the_end_of_what_is_tried() -> None:

@@ -1,10 +1,11 @@
 """A template for a task of your own. Copy this file, replace what is marked YOURS, and keep the order of `main`.
 
-    python my_task.py --policy logit-normal --seeds 10 --epochs 60
+    python my_task.py --policy logit-normal --seeds 10 --epochs 60 --out runs/first
 
 First come the checks, then what needs no learning, then training, and at last days that nobody has used: it prints
-what each earns there, and the lead over your rule with a 95 % interval. The task that stands here is a tank whose level
-shall be held at one metre while the demand goes up and down. It needs the package `inbounds` and nothing else.
+what each earns there, and the lead over your rule with a 95 % interval. `--out` keeps the policies, and training that
+was interrupted goes on from there; take another folder after every change of the task. The task that stands here is a
+tank whose level shall be held at one metre while the demand goes up and down. It needs `inbounds` and nothing else.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from inbounds.book.exercises.checks.environment import complaints
 from inbounds.book.own_task import best_of, compare, constant, greedy, noisy, play
-from inbounds.learning import FAMILIES, TrainConfig, preset, train
+from inbounds.learning import FAMILIES, TrainConfig, preset, save_run, train
 from inbounds.study.statistics import Estimate
 
 # ---- YOURS: the box in your units, what a policy sees, how long an episode lasts
@@ -107,6 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--policy", default="logit-normal", choices=FAMILIES)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--epochs", type=int, default=60)
+    parser.add_argument("--out", metavar="FOLDER", help="where to keep the run; nowhere by default")
     asked = parser.parse_args(arguments)
     if asked.seeds < 2:
         parser.error(f"--seeds {asked.seeds}: an interval needs two at least")
@@ -118,7 +120,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     by_hand = {"nothing": NOTHING, best_constant: CONSTANTS[best_constant], best_rule: RULES[best_rule]}
     returns = {name: play(act, make_envs, TESTED) for name, act in by_hand.items()}
 
-    run = train(plan(asked.policy, asked.seeds, asked.epochs), make_envs=make_envs)
+    run = train(plan(asked.policy, asked.seeds, asked.epochs), run_dir=asked.out, make_envs=make_envs)
+    if asked.out:
+        save_run(asked.out, run)  # load_policy(asked.out).act(obs, greedy="median") uses it
     for way, acting in (("greedy", greedy), ("noisy", noisy)):
         each = [play(acting(policy), make_envs, TESTED) for policy in run.policies]
         returns[f"{asked.policy}, {way}"] = np.stack(each)

@@ -33,6 +33,31 @@ def save(path: Path, state: dict[str, Any]) -> None:
     write_whole(path, buffer.getbuffer())
 
 
+def set_aside(path: Path, epoch: int) -> Path:
+    """Keep a checkpoint under a name that no later one takes: the state of a run before an epoch that went wrong.
+
+    Args:
+        path: of the checkpoint.
+        epoch: which.
+
+    Returns:
+        Where it is kept.
+
+    Raises:
+        OSError: it could not be written, as on a full disk; the checkpoint is untouched.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save(Path(folder, FILE_NAME), {"records": []})
+        ...     set_aside(Path(folder, FILE_NAME), 7).name
+        'checkpoint-before-epoch-7.pt'
+    """
+    kept = path.with_name(f"{path.stem}-before-epoch-{epoch}{path.suffix}")
+    write_whole(kept, path.read_bytes())
+    return kept
+
+
 def require_keepable(state: dict[str, Any]) -> None:
     """Raise a TypeError if `save` would: to be told before hours of training, not after.
 

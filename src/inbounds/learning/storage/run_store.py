@@ -81,9 +81,7 @@ def save_run(run_dir: str | Path, trainer: Run) -> None:
         ValueError: no epoch is done.
     """
     if not trainer.records:
-        raise ValueError(
-            "a run without an epoch has no curves: train one, or keep its policies by save_policies"
-        )
+        raise ValueError("a run without an epoch has no curves: train one first")
     Path(run_dir).mkdir(parents=True, exist_ok=True)
     write_curves(Path(run_dir) / CURVES_FILE, trainer.config, trainer.records)
     save_policies(Path(run_dir) / POLICIES_FILE, trainer)

@@ -209,3 +209,34 @@ def held(directory: Path) -> Iterator[None]:
                 # another. On Windows a file in use cannot be removed; there the library does it afterwards.
                 with contextlib.suppress(OSError):
                     path.unlink()
+
+
+@contextlib.contextmanager
+def claimed(run_dir: Path) -> Iterator[None]:
+    """Make a run directory, unless it is there, and hold it.
+
+    Args:
+        run_dir: absolute; the folders above it are made, too.
+
+    Raises:
+        BlockingIOError: somebody else holds it.
+        OSError: it cannot be made, or not be written.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder, claimed(Path(folder, "runs", "first")):
+        ...     Path(folder, "runs", "first").is_dir()
+        True
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            run_dir.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(held(run_dir))
+        except BlockingIOError as error:
+            raise BlockingIOError(
+                f"another process or thread trains in {run_dir}: wait until it is done, or choose another run_dir"
+            ) from error
+        except OSError as error:
+            said = f"{run_dir} cannot be a run directory ({error.strerror}): choose another run_dir"
+            raise OSError(error.errno, said) from error
+        yield

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -45,3 +47,31 @@ def episode_statistics(rollout: Rollout) -> dict[str, np.ndarray]:
         "episodes": np.array([len(r) for r in returns]),
         "return_mean": np.array([np.mean(r) if r else np.nan for r in returns]),
     }
+
+
+def told_of_divergence(
+    too_far: Sequence[int], fed_nonsense: Sequence[int], epoch: int, dtype: str
+) -> list[str]:
+    """Return what to say of seeds whose weights have just ceased to be finite: nothing, one sentence, or two.
+
+    Args:
+        too_far: seeds that had seen finite numbers alone.
+        fed_nonsense: seeds whose environment returned others.
+        epoch: in which it happened.
+        dtype: of the networks.
+
+    Example:
+        >>> [said] = told_of_divergence([3, 7], [], 12, "float32")
+        >>> said.partition(":")[0], said.rpartition(", or ")[2]
+        ('seeds [3, 7] diverged in epoch 12', 'train with a smaller learning_rate')
+    """
+    mend = (
+        "mend the environment, which has returned an observation or a reward that is no finite number, or one "
+        f"too large for {dtype} (gymnasium.utils.env_checker.check_env looks for more)"
+    )
+    return [
+        f"seeds {seeds} diverged in epoch {epoch}: their weights are not finite. They are marked in every later "
+        f"record; leave them out of means, or {advice}"
+        for seeds, advice in ((too_far, "train with a smaller learning_rate"), (fed_nonsense, mend))
+        if seeds
+    ]
