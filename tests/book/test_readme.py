@@ -50,13 +50,17 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     assert sorted(grade(row) for row in below) == ["found", "suggested"]
     assert len(above) == 2
     assert f"PPO's quiet Gaussian ends above one with σ = 1 on 2 of {len(ppo)} robots (found)" in said
-    assert "below on 2 (one found, one suggested);" in said
+    assert "below on 2 (1 of them found), by area above on 2 (found), below on 1;" in said
+    sides = answers.sides(
+        answers.of(quiet_starts(outcomes_of_both(outcomes)), algorithm="ppo", endpoint="area")
+    )
+    assert [[grade(row) for row in side] for side in sides] == [["found", "found"], ["suggested"]]
     (cheetah,) = answers.of(above, robot="HalfCheetah")
     assert f"on HalfCheetah by {spoken(cheetah.difference, 0)}," in said
     trpo = answers.of(final, algorithm="trpo")
     assert [(row.robot, grade(row)) for row in trpo] == [("HalfCheetah", "suggested"), ("Ant", "suggested")]
     assert len(answers.sides(trpo)[0]) == 2
-    assert "TRPO's above on both that were run (suggested): 4 to 2." in said
+    assert "under TRPO above on 2 of 2." in said
     assert answers.start_advice(ppo) != answers.start_advice(final)
 
 
@@ -78,8 +82,11 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert not graded["beta", "final", -1]
     assert graded["beta", "area", 1] == {"found": 1, "suggested": 1}
     assert graded["beta", "area", -1] == {"suggested": 1}
+    small = [row for row in answers.of(rows, law="beta", endpoint="area") if answers.too_small(row)]
+    assert sum(row.difference.high < 0 for row in small) == 2
     assert (
-        "Under PPO a Beta ends above on 2 of 6 robots (found), but is below on 1 by area (suggested);" in said
+        "PPO's Beta ends above on 2 of 6 robots (found), by area it is below on 3 (2 too little to matter);"
+        in said
     )
     assert not graded["logit-normal", "final", 1]
     assert graded["logit-normal", "final", -1] == {"found": 1}
@@ -93,7 +100,7 @@ def test_a_law(outcomes: Outcomes) -> None:
     assert "below" not in alike
     assert "), below on 1 (" in by_area
     assert (
-        "a logit-normal ends below on 1, with the Gaussian's kind of σ above on 2, but by area below on 1."
+        "a logit-normal ends below on 1, with the Gaussian's kind of σ above on 2, below on 1 by area."
         in said
     )
 
