@@ -58,7 +58,7 @@ def store(path: Path, text: str) -> None:
 
 def complaints(notebook: nbformat.NotebookNode) -> list[str]:
     """Return what keeps a stored notebook from being a faithful record of one clean run, from top to bottom."""
-    found, expected = [*unknown_values(notebook), *glued_twice(notebook)], 1
+    found, expected = [*unknown_values(notebook), *glued_twice(notebook), *not_on_the_page(notebook)], 1
     for number, cell in enumerate(notebook.cells):
         if cell.cell_type != "code" or not cell.source.strip():
             continue
@@ -87,6 +87,33 @@ def glued_twice(notebook: nbformat.NotebookNode) -> list[str]:
     """Return which names are glued more than once: the build warns of it, and its warnings are errors."""
     names = Counter(name for name, _ in glued(notebook.cells))
     return [f"glues {name!r} {count} times" for name, count in names.items() if count > 1]
+
+
+def not_on_the_page(notebook: nbformat.NotebookNode) -> list[str]:
+    """Return which names shown code uses that removed cells alone make: who copies it from the page lacks them."""
+    shown: set[str] = set()
+    removed: set[str] = set()
+    found = []
+    for number, cell in enumerate(notebook.cells):
+        tags = cell.metadata.get("tags", [])
+        if cell.cell_type != "code" or "remove-input" in tags:
+            continue
+        nodes = list(ast.walk(ast.parse(cell.source)))
+        names = [node for node in nodes if isinstance(node, ast.Name)]
+        made = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+        made |= {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+        made |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+        imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+        made |= {(each.asname or each.name).partition(".")[0] for node in imports for each in node.names}
+        if "remove-cell" in tags:
+            removed |= made
+            continue
+        shown |= made
+        lacking = {node.id for node in names if node.id in removed - shown}
+        found += [
+            f"cell {number}: uses {name!r}, which only a removed cell makes" for name in sorted(lacking)
+        ]
+    return found
 
 
 def unknown_values(notebook: nbformat.NotebookNode) -> list[str]:

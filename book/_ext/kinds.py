@@ -13,7 +13,7 @@ from inbounds.book.pages.contents import contents
 from inbounds.book.pages.counts import count_page
 
 KINDS = {"core": "Core chapter", "depth": "Going deeper"}
-HOW = "150 words or 15 lines of visible code a minute; without exercises and Teach it"
+HOW = "150 words or 15 lines of visible code a minute; without formulas, exercises and Teach it"
 
 
 def line(kind: str, minutes: int) -> str:

@@ -228,6 +228,22 @@ def test_the_hook_sees_a_name_that_is_glued_twice(tmp_path: Path, capsys: pytest
     assert "glues 'answer' 2 times" in capsys.readouterr().out
 
 
+def test_the_hook_sees_a_name_that_the_page_does_not_make(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    notebook = small_notebook(tmp_path)
+    hidden, shown = (nbformat.v4.new_code_cell(text) for text in ("def f(x):\n    return x", "f(1)"))
+    notebook.cells = [hidden, shown]
+    for tag, code in (("remove-cell", 1), ("hide-input", 0)):
+        hidden.metadata["tags"] = [tag]
+        for count, cell in enumerate(code_cells(notebook), 1):
+            cell.execution_count = count
+        nbformat.write(notebook, tmp_path / "chapter.ipynb")
+        assert notebook_hook.main(["--check", str(tmp_path / "chapter.ipynb")]) == code
+    said = capsys.readouterr().out
+    assert said.count("uses 'f', which only a removed cell makes") == 1
+
+
 def test_a_guess_at_what_no_cell_glues_is_noticed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     notebook = small_notebook(tmp_path)
     quote(notebook.cells[1], "1.5")
