@@ -63,6 +63,7 @@ class SeedLinear:
         bias: `[S, out, 1]`.
 
     Example:
+        >>> import torch
         >>> layer = SeedLinear(weight=torch.ones(2, 1, 3), bias=torch.tensor([[[0.0]], [[10.0]]]))
         >>> layer(torch.ones(2, 3, 5))[:, 0, 0].tolist()  # two seeds, a batch of five
         [3.0, 13.0]
@@ -77,7 +78,21 @@ class SeedLinear:
 
 
 def mlp(layers: Sequence[SeedLinear], obs: Tensor) -> Tensor:
-    """Return the outputs `[S, B, out]` for observations `[S, B, O]`: tanh between the layers, none after the last."""
+    """Return the outputs of S perceptrons: tanh between the layers, none after the last.
+
+    Args:
+        layers: from the inputs to the outputs.
+        obs: `[S, B, O]`.
+
+    Returns:
+        `[S, B, out]`.
+
+    Example:
+        >>> import torch
+        >>> layer = SeedLinear(torch.ones(2, 1, 3), torch.zeros(2, 1, 1))
+        >>> mlp([layer], torch.ones(2, 5, 3)).shape
+        torch.Size([2, 5, 1])
+    """
     h = obs.mT  # [S, O, B]
     for layer in layers[:-1]:
         h = tanh(layer(h))

@@ -236,6 +236,7 @@ def holm_at_best(p_values: ArrayLike) -> Floats:
     No p-value of a test that was made can become smaller than this when the others arrive.
 
     Example:
+        >>> from inbounds.study.statistics import holm
         >>> holm([0.02, float("nan")]).tolist(), holm_at_best([0.02, float("nan")]).tolist()
         ([0.04, nan], [0.02, 0.0])
     """

@@ -114,6 +114,7 @@ def combination(groups: Sequence[Floats], weights: Sequence[float]) -> Estimate:
         weight of 1 that of `mean_of`.
 
     Example:
+        >>> import numpy as np
         >>> groups = [np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 4.0])]
         >>> combination(groups, [1.0, -0.5]).value.item()
         1.0
