@@ -89,6 +89,7 @@ def mlp(layers: Sequence[SeedLinear], obs: Tensor) -> Tensor:
 
     Example:
         >>> import torch
+        >>> from inbounds.learning import SeedLinear
         >>> layer = SeedLinear(torch.ones(2, 1, 3), torch.zeros(2, 1, 1))
         >>> mlp([layer], torch.ones(2, 5, 3)).shape
         torch.Size([2, 5, 1])
