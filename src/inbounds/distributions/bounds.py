@@ -275,7 +275,7 @@ def require_bounds(
     Example:
         >>> require_bounds(-1.0, np.inf)  # doctest: +ELLIPSIS
         Traceback (most recent call last):
-        ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. An unbounded ...
+        ValueError: action box: the bounds must be finite, but low=-1.0, high=inf. Choose ... a Normal.
     """
     own = [b.detach().clone() if isinstance(b, Tensor) else np.array(b) for b in (low, high)]
     low, high = as_parameters(low=own[0], high=own[1]).values()
