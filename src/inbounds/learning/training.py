@@ -284,7 +284,7 @@ def train(
             record = trainer.epoch()
             if path is not None and path.exists() and np.sum(~trainer.diverged) < sound:
                 kept = checkpoint.set_aside(path, record["epoch"])
-                told = f"{kept} has the run before that epoch: once the environment is mended, rename it to {path.name}"
+                told = f"{kept} has the run before that epoch: with the fault mended, rename it to {path.name} to go on"
                 warnings.warn(told, DivergedSeedWarning, stacklevel=2)
             if path is not None and trainer.checkpoint_due:
                 checkpoint.save(path, trainer.state_dict())
