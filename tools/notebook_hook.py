@@ -89,6 +89,17 @@ def glued_twice(notebook: nbformat.NotebookNode) -> list[str]:
     return [f"glues {name!r} {count} times" for name, count in names.items() if count > 1]
 
 
+def defined(tree: ast.AST) -> set[str]:
+    """Return the names that a cell binds, at whatever depth: generous, because only names bound nowhere else count."""
+    names = {
+        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    names |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    names |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    return names | {alias.asname or alias.name.split(".")[0] for node in imports for alias in node.names}
+
+
 def not_on_the_page(notebook: nbformat.NotebookNode) -> list[str]:
     """Return which names shown code uses that removed cells alone make: who copies it from the page lacks them."""
     shown: set[str] = set()
@@ -98,18 +109,14 @@ def not_on_the_page(notebook: nbformat.NotebookNode) -> list[str]:
         tags = cell.metadata.get("tags", [])
         if cell.cell_type != "code" or "remove-input" in tags:
             continue
-        nodes = list(ast.walk(ast.parse(cell.source)))
-        names = [node for node in nodes if isinstance(node, ast.Name)]
-        made = {node.id for node in names if isinstance(node.ctx, ast.Store)}
-        made |= {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
-        made |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-        imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
-        made |= {(each.asname or each.name).partition(".")[0] for node in imports for each in node.names}
+        tree = ast.parse(cell.source)
+        made = defined(tree)
         if "remove-cell" in tags:
             removed |= made
             continue
         shown |= made
-        lacking = {node.id for node in names if node.id in removed - shown}
+        used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        lacking = used & (removed - shown)
         found += [
             f"cell {number}: uses {name!r}, which only a removed cell makes" for name in sorted(lacking)
         ]

@@ -13,6 +13,7 @@ from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from inbounds.cli.classroom import ready
+from tools.notebook_hook import defined
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -87,17 +88,6 @@ def between_markers(chapter: nbformat.NotebookNode, cell: nbformat.NotebookNode)
     text = "\n".join(before)
     balance = text.count("```{solution-start}") - text.count("```{solution-end}")
     return balance == 1 or "```{solution-end}" in cell.source
-
-
-def defined(tree: ast.AST) -> set[str]:
-    """Names that a cell binds, at whatever depth: generous, because only names bound nowhere else count."""
-    names = {
-        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    }
-    names |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
-    names |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-    return names | {alias.asname or alias.name.split(".")[0] for node in imports for alias in node.names}
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
