@@ -1,25 +1,24 @@
 """The README is short, its findings are the data's, its snippet runs, its picture and its links are there."""
 
 import re
-from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from inbounds.book.report import answers, secondary_tests, study_pages, ways_to_act
-from inbounds.book.report.equal_start import grade, laws, outcomes_of_both, quiet_starts
+from inbounds.book.report.equal_start import laws, outcomes_of_both, quiet_starts
 from inbounds.learning import load_policy
 from inbounds.study import grid
-from inbounds.study.analysis import Contrast
 from inbounds.study.outcomes import Outcomes
+from inbounds.study.second.yardsticks import MARGINS
 from inbounds.study.words import spoken
 from tools import readme_picture
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf8")
 BULLETS = re.findall(r"^- \*\*.*?(?=^- |^$)", TEXT, re.MULTILINE | re.DOTALL)
-PPO_BETA = Contrast("standard", "ppo", "beta", "gaussian")
 
 
 @pytest.fixture(scope="module")
@@ -44,62 +43,51 @@ def test_quiet_starts(outcomes: Outcomes) -> None:
     final = answers.of(quiet_starts(outcomes_of_both(outcomes)), endpoint="final")
     said = bullet(answers.start_advice(final))
     ppo = answers.of(final, algorithm="ppo")
-    above, below = answers.sides(ppo)
     assert {row.study for row in ppo} == {2}
-    assert {grade(row) for row in above} == {"found"}
-    assert sorted(grade(row) for row in below) == ["found", "suggested"]
-    assert len(above) == 2
-    assert f"PPO's quiet Gaussian ends above one with σ = 1 on 2 of {len(ppo)} robots (found)" in said
-    assert "below on 2 (1 of them found), by area above on 2 (found), below on 1;" in said
-    sides = answers.sides(
-        answers.of(quiet_starts(outcomes_of_both(outcomes)), algorithm="ppo", endpoint="area")
-    )
-    assert [[grade(row) for row in side] for side in sides] == [["found", "found"], ["suggested"]]
-    (cheetah,) = answers.of(above, robot="HalfCheetah")
-    assert f"on HalfCheetah by {spoken(cheetah.difference, 0)}," in said
+    assert sorted(map(answers.sign, ppo)) == [-1, -1, 0, 0, 1, 1]
+    (cheetah,), (humanoid,) = (answers.of(ppo, robot=robot) for robot in ("HalfCheetah", "Humanoid"))
+    assert f"on 2 of 6 robots under PPO (HalfCheetah: by {spoken(cheetah.difference, 0)})" in said
+    loss = humanoid.difference
+    lost = replace(loss, value=-loss.value, low=-loss.high, high=-loss.low)
+    assert f", lower on 2 (Humanoid: by {spoken(lost, 0)});" in said
     trpo = answers.of(final, algorithm="trpo")
-    assert [(row.robot, grade(row)) for row in trpo] == [("HalfCheetah", "suggested"), ("Ant", "suggested")]
-    assert len(answers.sides(trpo)[0]) == 2
-    assert "under TRPO above on 2 of 2." in said
+    assert [answers.sign(row) for row in trpo] == [1, 1]
+    assert said.endswith("under TRPO higher on 2 of 2.")
     assert answers.start_advice(ppo) != answers.start_advice(final)
 
 
 def test_a_law(outcomes: Outcomes) -> None:
-    every = laws(outcomes_of_both(outcomes))
+    both = outcomes_of_both(outcomes)
+    every = laws(both)
     for algorithm in ("ppo", "trpo"):
         assert answers.advice(every, algorithm).endswith(" no law leads: keep your library's law.")
-    rows = answers.of(every, algorithm="ppo")
     said = bullet("Then keep your library's law.")
-    graded = {
-        (law, endpoint, way): Counter(grade(row) for row in here if answers.sign(row) == way)
-        for law in ("beta", "logit-normal")
+
+    def counts(law: str, endpoint: str) -> tuple[int, int]:
+        rows = answers.of(every, algorithm="ppo", law=law, endpoint=endpoint)
+        assert [row.study for row in rows] == [2] * 6
+        above, below = answers.sides(rows)
+        return len(above), len(below)
+
+    assert (counts("beta", "final"), counts("beta", "area")) == ((2, 0), (2, 1))
+    assert "PPO's Beta is higher on 2 of 6 robots, faster on 2, slower on 1;" in said
+    assert (counts("logit-normal", "final"), counts("logit-normal", "area")) == ((0, 1), (1, 2))
+    assert "a logit-normal lower on 1, faster on 1, slower on 2, or" in said
+    alike = [
+        secondary_tests.verdicts(both, "law, σ free", "logit-normal", endpoint)
         for endpoint in ("final", "area")
-        for here in [answers.of(rows, law=law, endpoint=endpoint)]
-        for way in (1, -1)
+    ]
+    numbers = [re.findall(r"(above|below) on (\d)", each) for each in alike]
+    assert numbers == [[("above", "2")], [("above", "1"), ("below", "1"), ("above", "1")]]
+    large = {
+        (endpoint, robot): not -margin < gap.low < gap.high < margin
+        for endpoint, names in (("final", ("Ant", "Humanoid")), ("area", ("HalfCheetah", "Ant", "Humanoid")))
+        for robot in names
+        for margin in [MARGINS[endpoint][robot]]
+        for gap in [secondary_tests.difference(both, "law, σ free", "logit-normal", robot, endpoint)]
     }
-    assert all(row.study == 2 for row in rows)
-    assert graded["beta", "final", 1] == {"found": 2}
-    assert not graded["beta", "final", -1]
-    assert graded["beta", "area", 1] == {"found": 1, "suggested": 1}
-    assert graded["beta", "area", -1] == {"suggested": 1}
-    small = [row for row in answers.of(rows, law="beta", endpoint="area") if answers.too_small(row)]
-    assert sum(row.difference.high < 0 for row in small) == 2
-    assert (
-        "PPO's Beta ends above on 2 of 6 robots (found), by area above on 2 and below on 3 (2 by too little);"
-        in said
-    )
-    assert not graded["logit-normal", "final", 1]
-    assert graded["logit-normal", "final", -1] == {"found": 1}
-    assert graded["logit-normal", "area", 1] == {"found": 1}
-    assert graded["logit-normal", "area", -1] == {"found": 2}
-    alike, by_area = (
-        secondary_tests.verdicts(outcomes_of_both(outcomes), "law, σ free", "logit-normal", endpoint)
-        for endpoint in ("final", "area")
-    )
-    assert alike.startswith("above on 2 of 6 robots")
-    assert "below" not in alike
-    assert "), below on 1 (" in by_area
-    assert "a logit-normal below on 1, with a Gaussian's kind of σ above on 2, by area below on 1." in said
+    assert [place for place, each in large.items() if not each] == [("area", "Humanoid")]
+    assert said.endswith("with one σ for all states, higher on 2, faster on 1, slower on 1.")
 
 
 def test_the_median() -> None:
@@ -108,9 +96,8 @@ def test_the_median() -> None:
     noise, fresh_noise = (ways_to_act.count(ways_to_act.rows_of(each), "sample") for each in (shipped, fresh))
     said = bullet("Act by the median")
     assert not noise.above + fresh_noise.above
-    count = f"{noise.below} of the first study's {noise.cells} cells"
-    assert f"a Beta or logit-normal earns less than by its median in {count}" in said
-    assert f"{fresh_noise.below} of the second's {fresh_noise.cells}, more in none (suggested)." in said
+    assert f"in {noise.below + fresh_noise.below} of the {noise.cells + fresh_noise.cells} cells" in said
+    assert said.endswith("of both studies, and less in none.")
 
 
 def test_the_snippet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,6 +39,9 @@ assert min(gaussian.num_timesteps, logit_normal.num_timesteps) >= STEPS
     "TorchRL": """
 executed(batch["action"].detach().numpy())
 assert "latent" in batch.keys()
+from torchrl.modules import NormalParamExtractor
+loc, scale = NormalParamExtractor("biased_softplus_0.4")(torch.zeros(10_000, 2))
+executed(torch.normal(loc, scale).numpy())
 assert loss.actor_network is not None
 """,
 }
@@ -60,6 +63,7 @@ def test_it_is_read_in_two_minutes() -> None:
 
 
 def test_each_library_has_a_program() -> None:
+    assert 'NormalParamExtractor("biased_softplus_0.4")' in PROGRAMS["TorchRL"]
     assert set(PROGRAMS) == set(MEASURED)
     assert all(any(old in program for program in PROGRAMS.values()) for old in SHORTER)
 
