@@ -208,6 +208,15 @@ def test_the_dial_has_examples_of_its_own(words: list[str]) -> None:
     assert examples not in succeeds(["--help"])
 
 
+def test_the_dial_says_what_to_do_about_its_folders(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    where = ("--results", str(tmp_path / "file" / "r"), "--work", str(tmp_path / "file" / "w"))
+    code, out, err = run("study", "dial", "run", *where)
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("inbounds study dial: ")
+    assert err.endswith("make room, or choose other folders (--results, --work)\n")
+
+
 @pytest.mark.parametrize(("word", "number"), [("run", 2), ("status", 1), ("verify", 1), ("ledger", 6)])
 def test_a_word_of_the_study_has_its_own_examples_or_the_study_s(word: str, number: int) -> None:
     _, examples = succeeds(["study", word, "--help"]).split("\nexamples:\n")

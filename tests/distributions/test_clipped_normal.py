@@ -194,6 +194,9 @@ def test_entropy_at_its_limits() -> None:
     """All on one bound: 0. Shared by the bounds: log 2. Nothing clipped: the Normal's. Its unit matters."""
     assert float(law(50.0, 0.0).entropy()) == pytest.approx(0.0, abs=1e-12)
     assert float(law(0.0, 12.0).entropy()) == pytest.approx(math.log(2), abs=1e-3)
+    point = ClippedNormal(*double(0.0, 1e-155), -1.0, 1.0)
+    assert float(point.entropy()) == pytest.approx(math.log(1e-155) + math.log(2 * math.pi * math.e) / 2)
+    assert float(point.stddev) == pytest.approx(1e-155)
     narrow = law(0.1, -4.0)
     assert float(narrow.entropy()) == pytest.approx(
         float(Normal(narrow.loc, narrow.scale).entropy()), abs=1e-12

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from torch.distributions import Independent, kl_divergence
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
+from inbounds.distributions.open_interval import OpenInterval
 
 from .families import FAMILIES, Family, double, few, floats, intervals
 
@@ -422,6 +423,24 @@ def test_torch_knows_a_map_onto_the_open_interval(registry: Any) -> None:
     far = torch.tensor([[-200.0, 200.0], [200.0, -200.0], [-torch.inf, torch.inf]])
     assert law.support.check(to_box(far)).all()  # the closed interval's map rounds onto the bounds
     assert to_box == registry(law.support) != registry(LogitNormal(0.0, 1.0, -1.0, 1.0).support)
+    again = to_box.with_cache()
+    assert again == to_box
+    assert again(x) is again(x)  # kept
+    both = torch.distributions.ComposeTransform([registry(OpenInterval(0.0, 1.0))], cache_size=1)
+    assert both.inv(both(x)) is x
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_a_map_onto_bounds_that_are_numbers_has_those_bounds_in_any_precision(dtype: torch.dtype) -> None:
+    interval = OpenInterval(0.3, 0.7)
+    to_box = torch.distributions.biject_to(interval)
+    ends = to_box(torch.tensor([-torch.inf, torch.inf], dtype=dtype))
+    assert ends.dtype == dtype
+    assert interval.check(ends).all()
+    inside = torch.nextafter(torch.tensor(0.3, dtype=dtype), torch.tensor(1.0, dtype=dtype))
+    assert interval.check(inside)
+    assert not to_box.inv(inside).isnan()
+    assert to_box == torch.distributions.biject_to(OpenInterval(0.3, 0.7))
 
 
 def test_next_to_a_bound_at_zero_the_score_is_a_number() -> None:

@@ -2,6 +2,7 @@ import contextlib
 import copy
 import dataclasses
 import enum
+import functools
 import json
 import math
 import os
@@ -23,6 +24,7 @@ import torch
 from gymnasium.vector import VectorWrapper
 from gymnasium.wrappers.vector import NormalizeReward
 
+from inbounds import robots
 from inbounds.learning import (
     DivergedSeedWarning,
     PPOConfig,
@@ -389,7 +391,9 @@ def test_the_run_before_a_divergence_is_set_aside_and_can_be_gone_on_with(tmp_pa
     config = dataclasses.replace(small_config(epochs=3), checkpoint_every=1)
     with (
         pytest.warns(DivergedSeedWarning, match=r"seeds \[0, 1, 2\] diverged in epoch 1"),
-        pytest.warns(DivergedSeedWarning, match=r"before-epoch-1\.pt has the run before that epoch"),
+        pytest.warns(
+            DivergedSeedWarning, match=r"before-epoch-1\.pt is the last .*: a smaller learning_rate is"
+        ),
     ):
         train(config, run_dir=tmp_path, make_envs=PointEnv, callback=poison)
     with pytest.warns(DivergedSeedWarning, match="have diverged: nothing is left to train in it"):
@@ -398,6 +402,29 @@ def test_the_run_before_a_divergence_is_set_aside_and_can_be_gone_on_with(tmp_pa
     mended = train(config, run_dir=tmp_path, make_envs=PointEnv)
     assert not mended.diverged.any()
     assert torch.equal(weights(mended), weights(train(config, make_envs=PointEnv)))
+
+
+def test_with_the_environment_mended_the_run_before_can_be_gone_on_with(tmp_path: Path) -> None:
+    envs: list[PointEnv] = []
+
+    def make(n: int) -> PointEnv:
+        envs.append(PointEnv(n))
+        return envs[-1]
+
+    def poison(trainer: Trainer, record: Any) -> None:
+        if record["epoch"] == 0:
+            envs[-1].poisoned = [1]
+
+    config = dataclasses.replace(small_config(epochs=3), checkpoint_every=1)
+    with (
+        pytest.warns(DivergedSeedWarning, match="mend the environment"),
+        pytest.warns(
+            DivergedSeedWarning, match=r"before-epoch-1\.pt is .*: with the environment mended, rename it"
+        ),
+    ):
+        train(config, run_dir=tmp_path, make_envs=make, callback=poison)
+    (tmp_path / "checkpoint-before-epoch-1.pt").replace(tmp_path / checkpoint.FILE_NAME)
+    assert not train(config, run_dir=tmp_path, make_envs=PointEnv).diverged.any()
 
 
 def test_what_can_be_no_run_directory_is_named(tmp_path: Path) -> None:
@@ -451,6 +478,20 @@ def test_a_checkpoint_of_another_environment_is_refused(
     with pytest.raises(ValueError, match=said):
         trainer.load_state_dict(checkpoint.load(tmp_path / checkpoint.FILE_NAME))
     assert torch.equal(trainer.networks.actor.theta, theta)  # nothing of it has been loaded
+
+
+def test_nothing_is_loaded_where_the_environment_refuses() -> None:
+    """Two robots whose observations and actions have the same sizes: only the environment can tell them apart."""
+    config = dataclasses.replace(small_config(epochs=1), env="mine")
+    cheetah, walker = (
+        Trainer(config, functools.partial(robots.make, name)) for name in ("HalfCheetah-v5", "Walker2d-v5")
+    )
+    cheetah.epoch()
+    theta, before = walker.networks.actor.theta.clone(), copy.deepcopy(walker.collector.state_dict())
+    with pytest.raises(ValueError, match="The state is of 3 × HalfCheetah-v5"):
+        walker.load_state_dict(cheetah.state_dict())
+    assert torch.equal(walker.networks.actor.theta, theta)
+    np.testing.assert_equal(walker.collector.state_dict(), before)
 
 
 def test_a_checkpoint_that_may_not_be_read_is_not_called_damaged(

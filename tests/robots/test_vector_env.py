@@ -76,6 +76,12 @@ def test_a_state_that_does_not_fit_is_refused():
     for other in (make("Hopper-v5", 3), make("Swimmer-v5", 2)):
         with pytest.raises(ValueError, match=r"2 × Hopper-v5.*same name and num_envs"):
             other.set_state(hopper.get_state())
+    before, cut = hopper.get_state(), hopper.get_state()
+    cut["physics"] += 1
+    cut["generators"].pop()
+    with pytest.raises(ValueError, match="make it with the same name and num_envs"):
+        hopper.set_state(cut)
+    np.testing.assert_array_equal(hopper.get_state()["physics"], before["physics"])
 
 
 # ── Robots do not touch each other ───────────────────────────────────────────────────────────────────────────
@@ -109,6 +115,10 @@ def test_what_is_returned_is_the_callers_own():
                 values[:] = 0
         for array, before in zip(expected[:4], kept, strict=True):
             np.testing.assert_array_equal(array, before)
+    mask = np.array([True, False])
+    _, info = envs.reset(options={"reset_mask": mask})
+    mask[:] = False
+    assert info["_x_position"].tolist() == [True, False]
 
 
 def test_a_past_observation_stays_as_it_was():
@@ -268,6 +278,10 @@ def test_bad_calls():
     envs.reset(seed=0)
     with pytest.raises(ValueError, match=r"shape \(2, 3\), got \(3,\)"):
         envs.step(np.zeros(3, np.float32))
+    seeds = envs.np_random_seed
+    with pytest.raises(gymnasium.error.Error, match="Seed must be"):
+        envs.reset(seed=[5, -1])
+    assert envs.np_random_seed == seeds
     for bad in ([True], np.array([1, 0]), np.array([False, False])):
         with pytest.raises(ValueError, match="2 booleans, at least one"):
             envs.reset(options={"reset_mask": bad})

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from inbounds.cli.commands import Lines, read_one_of
-from inbounds.cli.errors import CommandError, complain
+from inbounds.cli.errors import CommandError, complain, complain_of_files
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.dial.cells import EPOCHS, dial_cells
 from inbounds.study.dial.outcomes import DialOutcomes, constant_guess, tally
@@ -86,8 +86,10 @@ def dial(args: Sequence[str]) -> int:
     command: DialCommand = read_one_of(COMMANDS, args, PROG, DESCRIPTION)
     try:
         return _do(command, Lines().say)
-    except (DamagedFileError, OSError) as error:
+    except DamagedFileError as error:
         return complain(error, prog=PROG)
+    except OSError as error:
+        return complain_of_files(error, PROG)
 
 
 def _do(command: DialCommand, say: Callable[[str], None]) -> int:

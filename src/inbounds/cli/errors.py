@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 import traceback
 
@@ -18,6 +19,24 @@ def complain(message: object, exit_code: int = 1, prog: str = "inbounds") -> int
     """Write a line to standard error, and return the exit code."""
     print(f"{prog}: {message}", file=sys.stderr)
     return exit_code
+
+
+def complain_of_files(error: OSError, prog: str) -> int:
+    """Write what the system says of the study's files, and what to do about it; return the exit code.
+
+    Raises:
+        OSError: the output is not read any more, or a name of the command line is too long: `main` speaks of these.
+    """
+    if isinstance(error, PermissionError):
+        return complain(
+            f"{error}: change its permissions, or choose other folders (--results, --work)", prog=prog
+        )
+    if isinstance(error, BlockingIOError):  # of a lock: it says itself what to do
+        return complain(error, prog=prog)
+    if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
+        raise error
+    kept = "What was finished is kept: make room, or choose other folders (--results, --work)"
+    return complain(f"{error}. {kept}", prog=prog)
 
 
 def is_ours(error: BaseException) -> bool:

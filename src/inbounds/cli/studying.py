@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Annotated, Any, Self, TypeAlias
 from tyro.conf import Positional, arg
 
 from inbounds.cli.commands import Lines, blaming_the_words, read_one_of
-from inbounds.cli.errors import CommandError, complain
+from inbounds.cli.errors import CommandError, complain, complain_of_files
 from inbounds.learning.storage.whole_files import DamagedFileError
 from inbounds.study.grid import Cell, all_cells, select
 from inbounds.study.ledger import Claim, claims_named, judge, quotes
@@ -198,14 +197,8 @@ def study(args: Sequence[str]) -> int:
         return complain(error, error.exit_code, PROG)
     except (DamagedFileError, StudyError) as error:
         return complain(error, prog=PROG)
-    except PermissionError as error:
-        said = f"{error}: change its permissions, or choose other folders (--results, --work)"
-        return complain(said, prog=PROG)
     except OSError as error:
-        if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
-            raise
-        said = f"{error}. What was finished is kept: make room, or choose other folders (--results, --work)"
-        return complain(said, prog=PROG)
+        return complain_of_files(error, PROG)
 
 
 def _run(command: Run, cells: Sequence[Cell], console: Lines) -> int:

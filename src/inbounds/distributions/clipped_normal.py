@@ -235,6 +235,9 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of(cls, lower: Tensor, upper: Tensor) -> _Parts:
+        lower, upper = (
+            b.clamp(-1e150, 1e150) for b in (lower, upper)
+        )  # their squares and log-masses are finite
         at_lower, at_upper = standard_normal_pdf(lower), standard_normal_pdf(upper)
         in_lower_half = standard_normal_cdf(upper) - standard_normal_cdf(lower)
         in_upper_half = standard_normal_cdf(-lower) - standard_normal_cdf(-upper)

@@ -103,30 +103,40 @@ class _IntoTheInterval(Transform):
     bijective = True
     sign = +1
 
-    def __init__(self, interval: OpenInterval) -> None:
-        super().__init__()
-        self.codomain = interval
-        self.low, self.high = (torch.as_tensor(b) for b in (interval.lower_bound, interval.upper_bound))
+    def __init__(self, interval: OpenInterval, cache_size: int = 0) -> None:
+        super().__init__(cache_size)
+        self.codomain = self._interval = interval
+
+    def with_cache(self, cache_size: int = 1) -> Transform:
+        return self if cache_size == self._cache_size else _IntoTheInterval(self._interval, cache_size)
 
     def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, _IntoTheInterval)
-            and torch.equal(self.low, other.low)
-            and torch.equal(self.high, other.high)
+        exact = torch.zeros((), dtype=torch.float64)
+        return isinstance(other, _IntoTheInterval) and all(
+            torch.equal(a, b) for a, b in zip(self._bounds(exact), other._bounds(exact), strict=True)
         )
 
     __hash__ = Transform.__hash__
 
+    def _bounds(self, like: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the two bounds; Python's numbers in the type of what is mapped."""
+        low, high = (
+            bound if isinstance(bound, Tensor) else like.new_tensor(bound)
+            for bound in (self._interval.lower_bound, self._interval.upper_bound)
+        )
+        return low, high
+
     def _call(self, x: Tensor) -> Tensor:
-        return from_line(x, self.low, self.high)
+        return from_line(x, *self._bounds(x))
 
     def _inverse(self, y: Tensor) -> Tensor:
-        return to_line(y, self.low, self.high)
+        return to_line(y, *self._bounds(y))
 
     def log_abs_det_jacobian(self, x: Tensor, y: Tensor) -> Tensor:
         """Return log width + log sigmoid(x) + log sigmoid(−x), `[...]`, finite wherever x is."""
         log_sigmoid = torch.nn.functional.logsigmoid
-        return (self.high - self.low).log() + log_sigmoid(x) + log_sigmoid(-x)
+        low, high = self._bounds(x)
+        return (high - low).log() + log_sigmoid(x) + log_sigmoid(-x)
 
 
 @biject_to.register(OpenInterval)

@@ -289,16 +289,16 @@ class Collector:
             ValueError: it is not of these environments.
         """
         self.check_state_dict(state)
+        set_state = getattr(self.envs, "set_state", None)  # not what a wrapper wraps: it would not know
+        if goes_on := state["envs"] is not None and set_state is not None:
+            set_state(state["envs"])  # before all else: it may refuse
+            self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
         restore_generators([stream.noise for stream in self.streams], state["noise"])
         if self.normalizer is not None:
             self.normalizer.load_state_dict(state["normalizer"])
-        set_state = getattr(self.envs, "set_state", None)  # not what a wrapper wraps: it would not know
-        if state["envs"] is None or set_state is None:
+        if not goes_on:
             # New starts, decided by the state; their observations are seen with the statistics that have been loaded.
             self.restart([int(stream.noise.integers(2**31)) for stream in self.streams])
-        else:
-            set_state(state["envs"])
-            self.obs, self.returns[:] = state["obs"].copy(), state["returns"]
 
     def _box(self) -> list[np.ndarray]:
         box: Any = self.envs.single_action_space

@@ -216,9 +216,9 @@ class Trainer:
             )
         self.networks.check_state_dict(state["networks"])
         self.collector.check_state_dict(state["collector"])
+        self.collector.load_state_dict(state["collector"])  # first, for the environments may refuse
         self.networks.load_state_dict(state["networks"])
         self.optimizer.load_state_dict(state["optimizer"])
-        self.collector.load_state_dict(state["collector"])
         restore_generators([stream.shuffle for stream in self.streams], state["shuffle"])
         self.records = list(state["records"])
         self.config = dataclasses.replace(self.config, epochs=max(self.config.epochs, len(self.records)))
@@ -280,11 +280,14 @@ def train(
                     warnings.warn(told, DivergedSeedWarning, stacklevel=2)
             checkpoint.require_keepable(trainer.state_dict())
         while not trainer.finished:
-            sound = np.sum(~trainer.diverged)
+            sound, sane = np.sum(~trainer.diverged), np.sum(~trainer.fed_nonsense)
             record = trainer.epoch()
             if path is not None and path.exists() and np.sum(~trainer.diverged) < sound:
                 kept = checkpoint.set_aside(path, record["epoch"])
-                told = f"{kept} has the run before that epoch: with the fault mended, rename it to {path.name} to go on"
+                mended = f"with the environment mended, rename it to {path.name} to go on"
+                slower = "a smaller learning_rate is another configuration, and needs another run_dir"
+                advice = mended if np.sum(~trainer.fed_nonsense) < sane else slower
+                told = f"{kept} is the last checkpoint before that epoch: {advice}"
                 warnings.warn(told, DivergedSeedWarning, stacklevel=2)
             if path is not None and trainer.checkpoint_due:
                 checkpoint.save(path, trainer.state_dict())

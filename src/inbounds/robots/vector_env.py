@@ -34,8 +34,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
 
     Robot *i* seeded with *s* behaves, bit for bit, as `gymnasium.make(name)` reset with seed *s*; an integer
     seed gives robot *i* the seed *s + i*, as in `SyncVectorEnv`. Each robot has its own random generator,
-    so it does not matter which others run beside it. Arrays that are returned are the caller's own. An episode
-    that ends is followed by a new one in the same step, which Gymnasium's `NormalizeObservation` does not take.
+    so it does not matter which others run beside it. Arrays that are returned are the caller's own (not an info's
+    masks). An episode that ends is followed by a new one in the same step: `NormalizeObservation` does not take that.
 
     Args:
         name: of the task, a key of `TASKS` (which documents each), such as `"HalfCheetah-v5"`.
@@ -132,9 +132,9 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         """
         seeds = _seeds(seed, self.num_envs)
         chosen = self._chosen(options)
-        for robot in np.flatnonzero(chosen):
-            if seeds[robot] is not None:
-                self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
+        made = {r: seeding.np_random(seeds[r]) for r in np.flatnonzero(chosen) if seeds[r] is not None}
+        for robot, seeded in made.items():  # all of them, or none
+            self._generators[robot], self._seeds[robot] = seeded
         where = self._start(chosen)
         messages.raise_pending()
         assert self._obs is not None
@@ -233,7 +233,8 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         Raises:
             ValueError: the state is of another task or number of robots.
         """
-        if state["name"] != self.name or state["physics"].shape != self._batch.state.shape:
+        ours = (self.name, self.num_envs, *self._batch.state.shape)
+        if (state["name"], len(state["generators"]), *state["physics"].shape) != ours:
             raise ValueError(
                 f"The state is of {len(state['physics'])} × {state['name']}, this environment has "
                 f"{self.num_envs} × {self.name}: make it with the same name and num_envs."
@@ -262,7 +263,7 @@ class RobotVectorEnv(VectorEnv[Array, Action, NDArray[Any]]):
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return self._everyone
-        mask = np.asarray(mask)
+        mask = np.array(mask)  # the caller may go on with theirs
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             raise ValueError(
                 f"reset_mask must be {self.num_envs} booleans, at least one of them True; got {mask!r}"

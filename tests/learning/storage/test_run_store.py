@@ -111,6 +111,7 @@ def test_a_diverged_policy_stays_in_the_middle_though_some_weights_are_finite(
     trainer = saved_run(tmp_path, family=family)
     tensors = trainer.tensors()
     tensors["policy.2.bias"][0, 0] = np.nan  # of the first motor alone
+    tensors["policy.0.weight"][0] = np.inf  # which a network that is asked makes NaN of, with a warning
     tensors["diverged"][0] = True
     policy = TrainedPolicy.from_tensors(trainer.config, tensors, 0)
     for way in policy.greedy_choices:
@@ -343,6 +344,7 @@ def test_a_configuration_survives_its_file(algo: str, name: str, tmp_path: Path)
             {"config": {"algorithm_name": "rocket"}},
             r"inbounds 9\.9 wrote the file.*'rocket'.*update inbounds",
         ),
+        ({"config": {"engine": "gpu"}}, r"inbounds 9\.9 wrote the file.*'gpu'.*update inbounds"),
     ],
 )
 def test_a_file_of_another_version_says_so(change: dict, said: str) -> None:

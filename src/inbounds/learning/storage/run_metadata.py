@@ -65,7 +65,7 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
 
     Raises:
         ValueError: it is of no run, of a format that is no number, or another version of the package wrote it, with
-            options that this one does not know.
+            options or values that this one does not know.
 
     Example:
         >>> from inbounds.learning import preset
@@ -83,7 +83,7 @@ def config_from(metadata: Mapping[str, Any]) -> TrainConfig:
         raise ValueError(f"the file has format {metadata['format']}: update inbounds to read it")
     try:
         return _rebuilt(metadata["config"])
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         writer = metadata.get("versions", {}).get("inbounds", "unknown")
         raise ValueError(
             f"inbounds {writer} wrote the file, with a configuration that this version cannot read ({error}): "

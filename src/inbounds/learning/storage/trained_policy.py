@@ -119,10 +119,11 @@ class TrainedPolicy:
             ValueError: observations of another size or not finite, or a greedy action that the family
                 does not offer.
         """
-        outputs, shape = self._outputs(obs)
+        seen, shape = self._seen(obs)
         self._require(greedy, self.greedy_choices)
-        if self.diverged or not len(outputs):  # a part of a diverged policy's weights may be finite
+        if self.diverged or not len(seen):  # a part of a diverged policy's weights may be finite
             return np.broadcast_to(self._policy.centre.astype(self._policy.dtype), shape).copy()
+        outputs = self._network.act(seen)
         if greedy == "sample":
             rng = np.random.default_rng(rng)
             action = self._policy.sample(outputs, [rng] * len(outputs), self.config.action_mode)
@@ -156,7 +157,8 @@ class TrainedPolicy:
             raise ValueError(
                 "the policy has diverged: it has no distribution, and holds the middle of its box"
             )
-        outputs, shape = self._outputs(obs)
+        seen, shape = self._seen(obs)
+        outputs = self._network.act(seen)
         return self._policy.distribution(torch.from_numpy(outputs).reshape(*shape[:-1], outputs.shape[-1]))
 
     def module(self, greedy: str = "median") -> nn.Module:
@@ -196,8 +198,8 @@ class TrainedPolicy:
                 f"{self.config.policy.family} does not act by {greedy!r}: choose one of {', '.join(choices)}"
             )
 
-    def _outputs(self, obs: ArrayLike) -> tuple[NDArray[Any], tuple[int, ...]]:
-        """Return the network's outputs `[B, 2A]` and the shape that actions for `obs` have."""
+    def _seen(self, obs: ArrayLike) -> tuple[NDArray[Any], tuple[int, ...]]:
+        """Return what the network sees, `[B, O]` (the weights of one seed serve every row), and the actions' shape."""
         obs, size = np.asarray(obs), self._network.sizes[0]
         if obs.ndim not in (1, 2) or obs.shape[-1] != size:
             raise ValueError(
@@ -212,8 +214,7 @@ class TrainedPolicy:
                 "an observation is NaN or infinite, and there is no action for that: look at the sensor, or at the "
                 "environment, that it came from"
             )
-        outputs = self._network.act(seen)  # the weights of one seed serve every row
-        return outputs, (*obs.shape[:-1], len(self.low))
+        return seen, (*obs.shape[:-1], len(self.low))
 
 
 def policies_from(config: TrainConfig, tensors: Mapping[str, NDArray[Any]]) -> list[TrainedPolicy]:
