@@ -265,6 +265,7 @@ def test_the_books_own_pages_quote_and_continue(extension: ModuleType) -> None:
         path.stem: {source.stem for source in extension.sources(path)}
         for path in (EXTENSIONS.parents[1] / "notebooks").glob("*.ipynb")
     }
-    assert found["which_policy"] == {"storing_actions", "greedy_action", "what_happened"}
+    others = {"storing_actions", "greedy_action", "what_happened", "objective_bonus_horizon"}
+    assert found["which_policy"] == others
     assert found["trpo"] >= {"policy_that_learns"}
     assert not found["greedy_action"]
