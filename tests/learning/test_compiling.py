@@ -63,7 +63,8 @@ def test_what_has_just_been_compiled_has_the_bits_of_what_is_read_in_any_order(t
     assert (
         len(list(tmp_path.rglob("*.nbi"))) == 6
     )  # three laws' passes, the values' pass, outputs, statistics
-    assert bits(RUNS[::-1], tmp_path) == fresh
+    for runs in (RUNS[::-1], RUNS[:1]):
+        assert bits(runs, tmp_path).items() <= fresh.items()
 
 
 def numbers(value: float = 3.0) -> tuple[Any, ...]:

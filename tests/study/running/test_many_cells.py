@@ -152,10 +152,10 @@ def test_processes_of_a_parent_that_was_killed_stop(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_two_runs_on_one_folder_share_the_work(tmp_path: Path) -> None:
-    folder, runs = folder_in(tmp_path), [start(tmp_path, 20) for _ in range(2)]
+    folder, runs = folder_in(tmp_path), [start(tmp_path, 40) for _ in range(2)]
     said = [run.communicate(timeout=300)[0] for run in runs]
     assert [run.returncode for run in runs] == [0, 0], said
-    for cell in cells_of(20):
+    for cell in cells_of(40):
         assert sum(f"{cell.id}: finished" in text for text in said) == 1
         assert first_mismatch(alone(cell, tmp_path), read_cell(folder.cell_file(cell))) == ""
         assert len(read_metadata(folder.cell_file(cell))["sessions"]) == 1
@@ -180,7 +180,7 @@ def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) ->
             os.kill(read_claim(folder.work_of(cell))["pid"], signal.SIGKILL)
 
         if __name__ == "__main__":
-            cells, folder = cells_of(20), folder_in(Path(sys.argv[1]))
+            cells, folder = cells_of(40), folder_in(Path(sys.argv[1]))
             with LocalCluster(
                 n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, protocol="tcp"
             ) as cluster:
@@ -194,9 +194,9 @@ def test_a_dask_worker_is_killed_and_the_results_are_the_same(tmp_path: Path) ->
     done = run_script(script, tmp_path, timeout=400)
     assert "['finished', 'finished', 'finished']" in done.stdout, done.stdout + done.stderr
     folder = folder_in(tmp_path)
-    for cell in cells_of(20):
+    for cell in cells_of(40):
         assert first_mismatch(alone(cell, tmp_path), read_cell(folder.cell_file(cell))) == ""
-    sessions = read_metadata(folder.cell_file(cells_of(20)[0]))["sessions"]
+    sessions = read_metadata(folder.cell_file(cells_of(40)[0]))["sessions"]
     assert len(sessions) == 2
     assert sessions[1]["from_epoch"] > 0
 
