@@ -235,9 +235,8 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of(cls, lower: Tensor, upper: Tensor) -> _Parts:
-        lower, upper = (
-            b.clamp(-1e150, 1e150) for b in (lower, upper)
-        )  # their squares and log-masses are finite
+        # Squares and log-masses of the bounds stay finite.
+        lower, upper = lower.clamp(-1e150, 1e150), upper.clamp(-1e150, 1e150)
         at_lower, at_upper = standard_normal_pdf(lower), standard_normal_pdf(upper)
         in_lower_half = standard_normal_cdf(upper) - standard_normal_cdf(lower)
         in_upper_half = standard_normal_cdf(-lower) - standard_normal_cdf(-upper)
