@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from torch import Tensor
 from torch.distributions import Normal
 
@@ -139,6 +138,8 @@ def normal_head_bias(
     executed_std: Callable[[float], float], std: float, limits: Limits
 ) -> tuple[float, float]:
     """Return loc 0 and the log_scale whose `executed_std` is std."""
+    from scipy.optimize import brentq  # here, because it takes a while
+
     log_scale = brentq(
         lambda s: executed_std(math.exp(s)) - std, limits.log_std_min, limits.log_std_max, xtol=1e-14
     )
