@@ -108,6 +108,8 @@ def test_a_module_is_found_in_its_own_folder_and_its_run_is_watched_on_request_o
     assert "inbounds watch 'my run' --trust" in err
     assert err.count("\n") == 1
 
+    (folder / "assets").mkdir()  # where it looks for its files from now on
+    (folder / "my_arm.py").write_text(f"{MODULE}\nos.chdir({str(folder / 'assets')!r})\n")
     watched = inbounds(*words, "--trust", cwd=folder)
     assert (watched.returncode, watched.stderr) == (0, "")
     assert "IMPORTED" in watched.stdout

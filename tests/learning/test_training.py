@@ -314,6 +314,7 @@ class Sign(enum.IntEnum):
         frozenset({1}),
         np.array([None]),
         np.array(["a"]),
+        np.ma.masked_array([1.0, 2.0], [True, False]),
         Path("x"),
         deque([1]),
         Sign.PLUS,
@@ -329,7 +330,19 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, kept: Any) 
     assert checkpoint.load(path)["records"] == [1]
 
 
-def test_numpys_numbers_are_read_again_as_pythons(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "number", [np.float32(0.1), np.True_, np.uint8(255), np.float64(2), np.complex64(1j)]
+)
+def test_a_number_of_numpys_keeps_its_type(tmp_path: Path, number: Any) -> None:
+    """Which decides how an environment goes on computing with it."""
+    path = tmp_path / checkpoint.FILE_NAME
+    checkpoint.save(path, some_state(1) | {"envs": [number, {"wind": number}, np.str_("a")]})
+    [back, within, text] = checkpoint.load(path)["envs"]
+    assert (type(back), back) == (type(within["wind"]), within["wind"]) == (type(number), number)
+    assert (type(text), text) == (str, "a")
+
+
+def test_numpys_numbers_are_read_again_as_pythons_in_keys_and_sets(tmp_path: Path) -> None:
     path = tmp_path / checkpoint.FILE_NAME
     checkpoint.save(path, some_state(1) | {"envs": {np.int64(3): {np.float32(0.5)}, (np.int64(1), "a"): 2}})
     assert repr(checkpoint.load(path)["envs"]) == "{3: {0.5}, (1, 'a'): 2}"

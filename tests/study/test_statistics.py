@@ -149,6 +149,12 @@ def test_a_tie_of_means_has_one_interval() -> None:
     assert (there.low, there.high) == (-back.high, -back.low)
 
 
+def test_a_tie_of_means_has_one_interval_with_a_seed_left_out() -> None:
+    a, b = [NAN, 1.0, 9.0, 0.0, 10.0, 5.0], [2.0, 8.0, 4.0, 6.0, 5.0, NAN]
+    there, back = statistics.minus(a, b), statistics.minus(b, a)
+    assert (there.low, there.high) == (-back.high, -back.low)
+
+
 def test_half_a_pair_is_no_pair() -> None:
     a, b = [1.0, NAN, 3.0, 4.0, 6.0], [0.0, 1.0, NAN, 1.0, 4.0]
     paired = statistics.difference(a, b, rng(), statistic="mean", paired=True, missing="exclude")

@@ -38,6 +38,7 @@ def run(command: Watch) -> int:
         (command.run if command.run.is_dir() else command.run.parent) / f"{greedy}-seed{policy.seed}.mp4"
     )
     _check(command, policy.config.env, path)
+    file = path.absolute()  # the environment, once imported, may change the directory
     rng = np.random.default_rng(command.env_seed)
 
     def act(obs: NDArray[Any]) -> NDArray[Any]:
@@ -70,7 +71,7 @@ def run(command: Watch) -> int:
             raise  # the environment's own
         raise CommandError(str(error)) from error
     try:
-        write_film(path, film)
+        write_film(file, film)
     except RuntimeError as error:  # of the encoder
         raise CommandError(str(error)) from error
     except OSError as error:

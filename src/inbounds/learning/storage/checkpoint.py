@@ -106,18 +106,20 @@ def _to_tensors(tree: Any, place: str = "state") -> Any:
     Raises:
         TypeError: it holds something else than numbers, strings, arrays of numbers, and collections of them.
     """
-    if isinstance(tree, np.ndarray) and tree.dtype.kind in "biufc":
+    numbers = isinstance(tree, np.ndarray | np.generic) and tree.dtype.kind in "biufc"
+    if numbers and not isinstance(tree, np.ma.MaskedArray):  # whose mask a tensor has not
         native = np.asarray(tree, tree.dtype.newbyteorder("="), order="C")
-        return {"__ndarray__": torch.from_numpy(native).clone()}
-    if isinstance(tree, np.generic):
-        tree = tree.item()
+        kind = "__ndarray__" if isinstance(tree, np.ndarray) else "__number__"
+        return {kind: torch.from_numpy(native).clone()}
     if isinstance(tree, dict):
         return {
-            _to_tensors(key, f"a key of {place}"): _to_tensors(value, f"{place}[{key!r}]")
+            _to_tensors(_hashable(key), f"a key of {place}"): _to_tensors(value, f"{place}[{key!r}]")
             for key, value in tree.items()
         }
     if type(tree) is set:
-        return {_to_tensors(value, f"an element of {place}") for value in tree}
+        return {_to_tensors(_hashable(value), f"an element of {place}") for value in tree}
+    if isinstance(tree, np.str_ | np.bytes_):
+        tree = tree.item()
     if type(tree) in (list, tuple):
         return type(tree)(_to_tensors(value, f"{place}[{i}]") for i, value in enumerate(tree))
     if type(tree) in _PLAIN or isinstance(tree, torch.Tensor):
@@ -129,10 +131,19 @@ def _to_tensors(tree: Any, place: str = "state") -> Any:
     )
 
 
+def _hashable(key: Any) -> Any:
+    """Return a key, or a set's element, with a number of NumPy's as Python's, which is equal and has its hash."""
+    if type(key) is tuple:
+        return tuple(map(_hashable, key))
+    return key.item() if isinstance(key, np.generic) else key
+
+
 def _to_arrays(tree: Any) -> Any:
     if isinstance(tree, dict):
         if tree.keys() == {"__ndarray__"}:
             return tree["__ndarray__"].numpy()
+        if tree.keys() == {"__number__"}:  # its type decides how its owner goes on computing
+            return tree["__number__"].numpy()[()]
         return {key: _to_arrays(value) for key, value in tree.items()}
     if isinstance(tree, list | tuple):
         return type(tree)(_to_arrays(value) for value in tree)

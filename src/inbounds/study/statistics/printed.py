@@ -63,7 +63,8 @@ def minus(first: ArrayLike, second: ArrayLike) -> Estimate:
         (1.0, True)
     """
     a, b = (np.asarray(x, np.float64) for x in (first, second))
-    if (np.nanmean(a), tuple(a)) < (np.nanmean(b), tuple(b)):
+    of_a, of_b = ((np.nanmean(x), tuple(np.nan_to_num(x, nan=-np.inf))) for x in (a, b))  # NaN has no order
+    if of_a < of_b:
         turned = minus(b, a)
         return replace(turned, value=-turned.value, low=-turned.high, high=-turned.low)
     return _minus(tuple(a), tuple(b))
