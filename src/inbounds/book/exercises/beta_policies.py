@@ -46,7 +46,10 @@ def beta_log_prob(function: Callable[..., Any]) -> Judgement:
         }
         return Case((action, alpha, beta, low, high), exact, mistakes, **known)
 
-    overflow = "Γ(500) overflows: add and subtract logarithms (scipy.special.betaln)"
+    overflow = (
+        "Γ(500) overflows, and single precision loses its digits: "
+        "add and subtract logarithms, in double precision (scipy.special.betaln)"
+    )
     cases = [
         case(0.3, 2.5, 1.5, -1.0, 1.0),
         case(0.1, 3.0, 5.0, 0.0, 0.4),

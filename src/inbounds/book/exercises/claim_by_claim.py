@@ -22,6 +22,10 @@ def within_reach(function: Callable[..., Any]) -> Judgement:
                 right[0],
                 _against(states, ("missing",)) >= len(states) - needed,
             ],
+            "refuted is no mirror image: it takes more against the claim than it can spare": [
+                right[0],
+                _against(states, ("missing",)) >= needed,
+            ],
             "the two answers have changed places: [supported, refuted]": right[::-1],
         }
         return Case((states, needed), right, {s: w for s, w in known.items() if w != right}, hint)

@@ -73,19 +73,28 @@ def final_interval(function: Callable[..., Any]) -> Judgement:
             reach = quantile * numbers.std(ddof=ddof) / (np.sqrt(numbers.size) if root else 1)
             return numbers.mean() + np.array([-reach, reach])
 
-        t, z = stats.t.ppf(0.975, seeds - 1), 1.96
+        t, z, rounded = stats.t.ppf(0.975, seeds - 1), stats.norm.ppf(0.975), 1.96
         pooled = tail.ravel()
         expected = interval(result, 1, t)
         mistakes = {
-            "all three errors are still there": interval(pooled, 0, z),
-            "every epoch still counts as a seed": interval(pooled, 1, z),
+            "all three errors are still there": interval(pooled, 0, rounded),
+            "every epoch still counts as a seed": interval(pooled, 1, rounded),
             "every epoch still counts as a seed: average within a seed first": interval(
                 pooled, 1, stats.t.ppf(0.975, pooled.size - 1)
             ),
             "every epoch counts as a seed: 1.96 was not the only trouble": interval(pooled, 0, t),
             "every epoch counts as a seed, although the quantile knows better": interval(pooled, 1, t),
-            "two errors are left: the divisor of the variance, and the quantile": interval(result, 0, z),
-            "1.96 is the Normal's quantile; with so few seeds Student's is wanted": interval(result, 1, z),
+            "two errors are left: the divisor of the variance, and the quantile": interval(
+                result, 0, rounded
+            ),
+            "1.96 is the Normal's quantile; with so few seeds Student's is wanted": interval(
+                result, 1, rounded
+            ),
+            "that is the Normal's quantile, 1.96 with more digits; with so few seeds Student's is wanted": interval(
+                result, 1, z
+            ),
+            "the divisor of the variance is wrong, and the quantile is the Normal's": interval(result, 0, z),
+            "every epoch still counts as a seed, and the quantile is the Normal's": interval(pooled, 1, z),
             "Student's quantile has n − 1 degrees of freedom, not n": interval(
                 result, 1, stats.t.ppf(0.975, seeds)
             ),

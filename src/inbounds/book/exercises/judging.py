@@ -197,11 +197,18 @@ def _beside(answer: Any, expected: Any, rtol: float) -> str:
     except (TypeError, ValueError):
         found = right = np.zeros(())
     if found.shape != right.shape or found.size < 2:
-        return f"expected {brief(expected)}, got {brief(answer)}"
+        return _apart(brief(expected), brief(answer))
     wrong = ~np.isclose(found, right, rtol=rtol, atol=0.0, equal_nan=True)
     place = tuple(int(i) for i in np.argwhere(wrong)[0])
     where = f"{wrong.sum()} of {right.size} numbers differ, first that at {list(place)}"
-    return f"{where}: expected {right[place]:.6g}, got {found[place]:.6g}"
+    return f"{where}: {_apart(brief(right[place]), brief(found[place]))}"
+
+
+def _apart(expected: str, got: str) -> str:
+    """Two values side by side; where they are written alike, what keeps them apart."""
+    if expected == got:
+        return f"{got} is right to about six digits and no further: compute in double precision"
+    return f"expected {expected}, got {got}"
 
 
 def brief(value: Any) -> str:

@@ -40,6 +40,11 @@ def squashed_score(function: Callable[..., Any]) -> Judgement:
                 float(2 * np.arctanh(action)) if abs(action) < 1 else np.nan
             ),
             "the derivative is with respect to σ, not log σ: multiply it by σ": right / [1.0, scale],
+            "log_scale is log σ: take its exponential first": (
+                np.array([(z - loc) / log_scale**2, (z - loc) ** 2 / log_scale**2 - 1])
+                if log_scale
+                else np.full(2, np.nan)
+            ),
             "the sign is wrong: that is the gradient of minus the log-density": -right,
             "the Jacobian's slope does not belong there: it does not contain the parameters": right + slope,
             "the order is (μ, log σ)": right[::-1],

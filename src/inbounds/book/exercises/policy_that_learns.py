@@ -97,6 +97,9 @@ def score(function: Callable[..., Any]) -> Judgement:
         mistakes = {
             "the second row is the derivative in σ; in log σ it is σ times that": right / [[1.0], [std]],
             "the first row lacks a factor 1/σ: u itself depends on μ by 1/σ": right * [[std], [1.0]],
+            "log_scale is log σ: take its exponential first": np.stack(
+                [off / log_scale**2, off**2 / log_scale**2 - 1]
+            ),
             "the second row lacks the −1 of −log σ": right + np.array([[0.0], [1.0]]),
             "the sign is wrong: a latent above μ is made more probable by raising μ": -right,
             "the rows are exchanged: μ first, then log σ": right[::-1],

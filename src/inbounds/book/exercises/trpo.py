@@ -178,7 +178,7 @@ def conjugate_gradient(function: Callable[..., Any]) -> Judgement:
 
 
 def natural_step(function: Callable[..., Any]) -> Judgement:
-    """The full step √(2D / xᵀ(F + cI)x) x with (F + cI) x = b, from the surrogate and the divergence.
+    """The full step √(2D / xᵀ(F + c_F Id)x) x with (F + c_F Id) x = b, from the surrogate and the divergence.
 
     Args:
         function: the reader's ``natural_step(gain, mean_kl, weights, max_kl, damping)``; it returns a vector `[P]`
@@ -193,7 +193,7 @@ def natural_step(function: Callable[..., Any]) -> Judgement:
     x, plain = torch.linalg.solve(posed.damped, posed.gradient), posed.gradient
     undamped, image = torch.linalg.solve(posed.fisher, posed.gradient), posed.damped @ plain
     mistakes = {
-        "½ xᵀ(F + cI)x is max_kl/2: there is a 2 under the root": right / 2**0.5,
+        "½ xᵀ(F + c_F Id)x is max_kl/2: there is a 2 under the root": right / 2**0.5,
         "the fraction under the root is upside down": ((x @ plain) / (2 * MAX_KL)).sqrt() * x,
         "the 2 stands on the wrong side of the fraction": right / 2,
         "under the root stands x · product(x), not b · b": (2 * MAX_KL / (plain @ plain)).sqrt() * x,
@@ -207,7 +207,7 @@ def natural_step(function: Callable[..., Any]) -> Judgement:
         * image,
         "b is the gradient of gain(): that of mean_kl() is 0 here": right * torch.nan,
         "the root is missing": 2 * MAX_KL / (x @ plain) * x,
-        "that is x: give it the length √(2 max_kl / xᵀ(F + cI)x)": x,
+        "that is x: give it the length √(2 max_kl / xᵀ(F + c_F Id)x)": x,
         "the Euclidean length is √(2 max_kl): measure with the damped product": (2 * MAX_KL / (x @ x)).sqrt()
         * x,
         "it walks downhill: the surrogate is to be made large": -right,
@@ -226,8 +226,8 @@ def natural_step(function: Callable[..., Any]) -> Judgement:
         * plain,
     }
     hint = (
-        "½ xᵀ(F + cI)x = max_kl and (F + cI) x ∥ b do not both hold. Does product(v) return Fv + damping · v? does "
-        "conjugate_gradient take its ten iterations?"
+        "½ xᵀ(F + c_F Id)x = max_kl and (F + c_F Id) x ∥ b do not both hold. Does product(v) return Fv + damping · v? "
+        "does conjugate_gradient take its ten iterations?"
     )
     case = Case((*posed.of(weights), weights, MAX_KL, DAMPING), right, mistakes, hint)
     verdict = judge_cases(function, [case], "right: direction and length are those of dense algebra")

@@ -79,14 +79,16 @@ def scores(function: Callable[..., Any]) -> Judgement:
         idle = rng.uniform(50, 200, robots)
         gain = rng.uniform(20, 900, robots) * rng.uniform(0.2, 1, (policies, robots))
         final = idle[:, None] + gain[..., None] * rng.uniform(0.5, 1.5, (policies, robots, seeds))
-        mistakes = {}
+        best = final.mean(2).max(0)
+        mean = ((final - idle[:, None]) / (best - idle)[:, None]).mean((1, 2))
+        mistakes = {"that is the mean of all runs: leave out the lowest and the highest quarter": mean}
         for count in range(1, len(BUGS) + 1):
             for left in itertools.combinations(BUGS, count):
                 mistakes["; ".join(BUGS[bug] for bug in left)] = _scores(final, idle, left)
         return Case((final, idle), _scores(final, idle), mistakes, hint)
 
     cases = [
-        case(3, 4, 8, "one number per policy is expected, `[C]`"),
+        case(3, 4, 8, "one number per policy, `[C]`: the interquartile mean of all its scaled runs"),
         case(2, 6, 2, "it must hold for any number of policies, robots and seeds"),
     ]
     return judge_cases(

@@ -37,6 +37,7 @@ def value_under_a_clock(function: Callable[..., Any]) -> Judgement:
             "one step is missing: a step still earns its own reward": ((left - 1) / gamma).mean(),
             "that is the sum over the episode: divide by N": left.sum(),
             "that is the shortfall's share, not the value": 1 - left.mean() / endless,
+            "that is the share of the value that is learned: return the value": left.mean() / endless,
         }
         return Case((gamma, steps), left.mean(), mistakes)
 

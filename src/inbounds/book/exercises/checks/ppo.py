@@ -172,7 +172,7 @@ def _weighs_by_the_ratio(function: Loss) -> str | None:
             "the ratio is 1 whatever the policy has done since: divide by the density that *drew* the latent, which is "
             "stored"
         )
-    return "inside 1 ± ε the gradient must be minus the mean of r Â ∇log π"
+    return "inside 1 ± ε the gradient must be minus the mean of w Â ∇log π"
 
 
 def _leaves_the_way_back_open(function: Loss) -> str | None:
@@ -184,10 +184,10 @@ def _leaves_the_way_back_open(function: Loss) -> str | None:
         return None
     if not gradient.any():
         return (
-            "actions that were better than expected have become *less* likely, r < 1 − ε, and the loss does not bring "
+            "actions that were better than expected have become *less* likely, w < 1 − ε, and the loss does not bring "
             "them back: clip the gain, not the loss of it"
         )
-    return "for Â > 0 and r < 1 − ε the clip has no say: the gradient must be minus the mean of r Â ∇log π"
+    return "for Â > 0 and w < 1 − ε the clip has no say: the gradient must be minus the mean of w Â ∇log π"
 
 
 def _knows_bad_actions(function: Loss) -> str | None:
@@ -200,11 +200,11 @@ def _knows_bad_actions(function: Loss) -> str | None:
         wanted = moved.weighted_score(ratio * advantage)
         if not alive and _close(gradient, wanted):
             return (
-                "of the actions that were worse than expected, those with r < 1 − ε must be left alone: nothing is "
+                "of the actions that were worse than expected, those with w < 1 − ε must be left alone: nothing is "
                 "clipped there"
             )
         if not _close(gradient, wanted if alive else 0 * wanted):
-            where = "r > 1 + ε must still be pushed down" if alive else "r < 1 − ε must be left alone"
+            where = "w > 1 + ε must still be pushed down" if alive else "w < 1 − ε must be left alone"
             return (
                 f"of the actions that were worse than expected, those with {where}: multiply by Â *before* you take "
                 "the minimum"
@@ -218,7 +218,7 @@ def _stops_paying(function: Loss) -> str | None:
     moved = scene.with_ratios(torch.linspace(1.3, 1.7, STEPS, dtype=torch.float64))
     gradient = moved.gradients(policy_loss(function, moved))[0]
     if gradient.any():
-        return "for Â > 0 and r > 1 + ε the surrogate is flat: nothing may push these ratios further up"
+        return "for Â > 0 and w > 1 + ε the surrogate is flat: nothing may push these ratios further up"
     if not moved.gradients(moved.loss(function, clip_range=1.0))[0].any():
         return "clip_range does not reach the surrogate: 1 + clip_range was 2, ratios below it were clipped: pass it on"
     return _turns_at(function, scene, 1 + EPSILON)
@@ -232,7 +232,7 @@ def _turns_at(function: Loss, scene: Scene, corner: float) -> str | None:
     wanted = moved.weighted_score(ratio * moved.advantage * paid)
     if _close(moved.gradients(policy_loss(function, moved))[0], wanted):
         return None
-    return f"the surrogate must turn flat at r = {corner:g}, where clip_range is {EPSILON}: clamp r to 1 ± clip_range"
+    return f"the surrogate must turn flat at w = {corner:g}, where clip_range is {EPSILON}: clamp w to 1 ± clip_range"
 
 
 def _teaches_the_critic(function: Loss) -> str | None:

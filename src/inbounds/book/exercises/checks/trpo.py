@@ -6,8 +6,8 @@ that one broken line fails one of them:
 
 | Check       | What must hold                                                       |
 |-------------|----------------------------------------------------------------------|
-| direction   | the step is parallel to (F + cI)⁻¹ b                                 |
-| length      | ½ Δᵀ(F + cI)Δ = D, where the line search has nothing to do           |
+| direction   | the step is parallel to (F + c_F Id)⁻¹ b                                 |
+| length      | ½ Δᵀ(F + c_F Id)Δ = D, where the line search has nothing to do           |
 | trust       | where the quadratic model fails, the exact KL divergence stays ≤ D   |
 | improvement | where the linear model fails, the surrogate still goes up            |
 | refusal     | where no length will do, the parameters stay as they were            |
@@ -57,7 +57,7 @@ class Problem:
 
     @property
     def damped(self) -> Tensor:
-        """F + cI `[P, P]`."""
+        """F + c_F Id `[P, P]`."""
         return self.fisher + DAMPING * torch.eye(SIZE, dtype=torch.float64)
 
     def surrogate(self, theta: Tensor) -> Tensor:
@@ -132,7 +132,7 @@ def _direction(function: Step) -> str:
     for diagnosis_, wrong in known.items():
         if parallel(step, wrong):
             return diagnosis_
-    return "the step does not solve (F + cI) x = b: compare the solver with torch.linalg.solve"
+    return "the step does not solve (F + c_F Id) x = b: compare the solver with torch.linalg.solve"
 
 
 def _length(function: Step) -> str:
@@ -148,14 +148,14 @@ def _length(function: Step) -> str:
     if near(spent, MAX_KL):
         return ""
     if near(spent, MAX_KL / 2):
-        return "½Δᵀ(F + cI)Δ is max_kl/2: there is a 2 under the root"
+        return "½Δᵀ(F + c_F Id)Δ is max_kl/2: there is a 2 under the root"
     if near(undamped, MAX_KL) or near(4 * undamped, MAX_KL):  # rounding may have cost it one halving
         return "½ΔᵀFΔ is max_kl: measure the length with the damped product, as the solve does"
     if near((step @ step / 2).item(), MAX_KL):
         return "the Euclidean length is √(2 max_kl): measure with the damped product"
     if near(spent, without_root):
         return "the root is missing"
-    return f"½Δᵀ(F + cI)Δ is {spent / MAX_KL:.3g} max_kl, and should be max_kl"
+    return f"½Δᵀ(F + c_F Id)Δ is {spent / MAX_KL:.3g} max_kl, and should be max_kl"
 
 
 def _trust(function: Step) -> str:
