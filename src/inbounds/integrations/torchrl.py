@@ -52,7 +52,7 @@ PARAMETERS: Mapping[type[LogitNormal | ScaledBeta], tuple[str, str]] = MappingPr
 
 
 LEAST_SCALE = 0.0101
-"""A little above 0.01, the smallest σ that TorchRL's `NormalParamExtractor` gives."""
+"""A little above 0.01, the smallest σ that the `biased_softplus` maps of TorchRL's `NormalParamExtractor` give."""
 
 
 class Latents(Distribution):
