@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from inbounds.book.drawing import alt_text, figures
 from inbounds.book.drawing.narrow import WIDTH, rearrange
@@ -78,6 +79,26 @@ def test_a_legend_is_as_wide_as_the_figure_allows() -> None:
     assert box.width <= fig.bbox.width
     assert [text.get_text() for text in legend.get_texts()] == names
     assert box.y1 < min(ax.get_window_extent().y0 for ax in fig.axes)  # still below
+
+
+def test_a_panel_without_a_title_takes_its_columns() -> None:
+    fig, axes = plt.subplots(2, 2, figsize=(6.8, 5))
+    for ax, title in zip(axes[0], ("PPO", "TRPO"), strict=True):
+        ax.set_title(title)
+    axes[1, 1].set_title("its own")
+    assert rearrange(fig)
+    assert [ax.get_title() for ax in fig.axes] == ["PPO", "TRPO", "PPO", "its own"]
+
+
+def test_a_legend_keeps_dashes_and_markers_beside_error_bars() -> None:
+    fig, ax = plt.subplots(figsize=(6.8, 3.8))
+    for number, look in enumerate(("o--", "s:")):
+        ax.errorbar([0, 1], [number, number], yerr=0.1, fmt=look, label=look)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    assert rearrange(fig)
+    drawn = fig.legends[0].findobj(Line2D)
+    assert {"--", ":"} <= {line.get_linestyle() for line in drawn}  # type: ignore[attr-defined]
+    assert {"o", "s"} <= {line.get_marker() for line in drawn}  # type: ignore[attr-defined]
 
 
 def test_a_legend_on_its_curves_moves_above_the_only_panel() -> None:

@@ -109,6 +109,8 @@ def test_a_hollow_marker_is_the_first_study_where_there_are_both() -> None:
     both, one = (answers.by_endpoint(part, SECOND_ONE.algorithm)._repr_html_() for part in (rows, rows[:2]))
     assert "Hollow: the first study" in both
     assert "Filled: found by a corrected test. Hollow: not." in one
+    untested = answers._caption({"": [dataclasses.replace(SECOND_ONE, p_adjusted=float("nan"))]})
+    assert "All markers are hollow: no corrected test of these differences was planned." in untested
 
 
 @pytest.fixture

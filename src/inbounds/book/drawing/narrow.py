@@ -96,10 +96,13 @@ def _spec(ax: Axes) -> SubplotSpec:
 
 
 def _regrid(panels: Sequence[Sequence[Axes]], grid: Any, new: GridSpec) -> None:
-    """Put the panels into another grid, each with the labels that it shared with a neighbour."""
+    """Put the panels into another grid, each with the title and labels that it shared with a neighbour."""
     leaders = {_spec(ax).rowspan.start: ax for ax, *_ in reversed(panels)}
+    titles = {_spec(ax).colspan.start: ax.get_title() for ax, *_ in reversed(panels)}  # of each column's top
     for number, (ax, *twins) in enumerate(panels):
         leader = leaders[_spec(ax).rowspan.start]
+        if ax.axison:
+            ax.set_title(ax.get_title() or titles[_spec(ax).colspan.start])
         if number % new.ncols == 0 and ax.axison:
             ax.tick_params(labelleft=leader.yaxis.get_tick_params()["labelleft"])
             ax.set_ylabel(ax.get_ylabel() or leader.get_ylabel())
@@ -113,11 +116,13 @@ def _narrow(fig: Figure, legend: Any) -> None:
     """Put a legend above or below the panels, in so many columns that the figure is wide enough for it."""
     side = "lower" if legend._outside_loc == "lower" else "upper"
     texts, title = [text.get_text() for text in legend.get_texts()], legend.get_title().get_text()
+    bars = {
+        each.get_label(): each for ax in fig.axes for each in ax.containers
+    }  # whole: a legend keeps parts of them
+    handles = [bars.get(text, handle) for text, handle in zip(texts, legend.legend_handles, strict=True)]
     for columns in range(min(legend._ncols, len(texts)) if legend in fig.legends else 2, 0, -1):
         legend.remove()
-        legend = fig.legend(
-            legend.legend_handles, texts, loc=f"outside {side} center", ncols=columns, title=title or None
-        )
+        legend = fig.legend(handles, texts, loc=f"outside {side} center", ncols=columns, title=title or None)
         fig.draw_without_rendering()
         if legend.get_window_extent().width <= fig.bbox.width:
             return

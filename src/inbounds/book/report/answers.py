@@ -6,6 +6,7 @@ first_choice(of(rows, algorithm="ppo"))
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from inbounds.book.report import html
@@ -279,7 +280,12 @@ def _caption(panels: Mapping[str, Sequence[Evidence]]) -> str:
             "first study, whose Gaussian has a σ that depends on the state."
         )
     else:
-        said.append("Filled: found by a corrected test. Hollow: not.")
+        tested = any(not math.isnan(row.p_adjusted) for row in rows)  # NaN: no protocol planned a test
+        said.append(
+            "Filled: found by a corrected test. Hollow: not."
+            if tested
+            else "All markers are hollow: no corrected test of these differences was planned."
+        )
         said.append(
             "All from the second study, with fresh seeds." if studies == {2} else "All from the first study."
         )

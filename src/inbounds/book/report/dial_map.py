@@ -39,6 +39,7 @@ def draw_map(findings: Sequence[Finding], endpoint: Endpoint) -> Figure:
             ]
             _draw(ax, law, chosen, shift)
         ax.set_xticks(range(len(FRACTIONS)), [f"{f:g}" for f in FRACTIONS], rotation=90)
+        ax.set_xlim(-0.6, len(FRACTIONS) - 0.4)
         ax.set_yscale("symlog", linthresh=0.1, linscale=1.5)
         ax.set_yticks([-2, -0.5, -0.1, 0, 0.1, 0.5], ["−2", "−0.5", "−0.1", "0", "0.1", "0.5"])
         ax.minorticks_off()
