@@ -214,7 +214,7 @@ def test_the_dial_says_what_to_do_about_its_folders(tmp_path: Path) -> None:
     code, out, err = run("study", "dial", "run", *where)
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith("inbounds study dial: ")
-    assert err.endswith("make room, or choose other folders (--results, --work)\n")
+    assert err.endswith("What was finished is kept: choose other folders (--results, --work)\n")
 
 
 @pytest.mark.parametrize(("word", "number"), [("run", 2), ("status", 1), ("verify", 1), ("ledger", 6)])

@@ -19,12 +19,21 @@ import torch
 from rich.console import Console
 
 from inbounds.cli import main, options
+from inbounds.cli.errors import CommandError
 from inbounds.cli.progress import TrainingProgress
+from inbounds.cli.tensorboard import TensorBoardWriter
 from inbounds.cli.training import step_sizes
 from inbounds.learning import Trainer
 from inbounds.learning.config import ALGORITHMS
 from inbounds.learning.storage import checkpoint
-from inbounds.learning.storage.run_store import load_checkpoint, load_policies, read_curves
+from inbounds.learning.storage.run_store import (
+    CHECKPOINT_FILE,
+    CURVES_FILE,
+    POLICIES_FILE,
+    load_checkpoint,
+    load_policies,
+    read_curves,
+)
 from inbounds.learning.storage.whole_files import LOCK_FILE, is_disk_full
 from tests.cli.small import contents, run, same_rows, small, succeeds
 
@@ -523,6 +532,54 @@ def test_tensorboard_without_a_place_for_its_files(tmp_path: Path) -> None:
     assert code == 1
     assert "cannot hold TensorBoard's files" in err
     assert "choose another --out" in err
+
+
+class Writer:
+    """Of TensorBoard's events, on a disk that is full from some moment on."""
+
+    full = OSError(errno.ENOSPC, "No space left on device")
+    at_once = False
+
+    def __init__(self, *_: object, **__: object) -> None:
+        if self.at_once:
+            raise self.full
+
+    def close(self) -> None:
+        raise self.full
+
+
+def test_a_full_disk_stops_tensorboard_and_not_what_there_is_to_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("tensorboard")
+    monkeypatch.setattr("torch.utils.tensorboard.SummaryWriter", Writer)
+    with pytest.raises(CommandError, match="keeps 3 epochs"), TensorBoardWriter(tmp_path, (0,)):
+        raise CommandError("keeps 3 epochs")
+    with pytest.raises(OSError, match="No space left"), TensorBoardWriter(tmp_path, (0,)):
+        pass
+    monkeypatch.setattr(Writer, "at_once", True)
+    with pytest.raises(CommandError, match=r"the disk is full.*Make room"):
+        TensorBoardWriter(tmp_path, (0,))
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: torch.empty(2**60), lambda: np.empty(2**59)], ids=["torch", "numpy"]
+)
+def test_without_memory_for_it_a_run_ends_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Any
+) -> None:
+    monkeypatch.setattr("inbounds.cli.training.train", lambda *_, **__: make())
+    code, _, err = run(*small(tmp_path / "run", 1, "Hopper-v5"))
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.startswith("inbounds: there is no memory for such a run: choose fewer --seeds")
+
+
+def test_what_a_killed_process_left_half_written_goes(tmp_path: Path) -> None:
+    left = [tmp_path / f".{name}.0123abcd.partial" for name in (CURVES_FILE, POLICIES_FILE, CHECKPOINT_FILE)]
+    for each in left:
+        each.touch()
+    succeeds(small(tmp_path, 1))
+    assert not any(each.exists() for each in left)
 
 
 def test_tensorboard_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

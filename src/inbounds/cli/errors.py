@@ -35,8 +35,25 @@ def complain_of_files(error: OSError, prog: str) -> int:
         return complain(error, prog=prog)
     if isinstance(error, BrokenPipeError) or error.errno == errno.ENAMETOOLONG:
         raise error
-    kept = "What was finished is kept: make room, or choose other folders (--results, --work)"
+    room = "make room, or " if error.errno in (errno.ENOSPC, errno.EDQUOT) else ""
+    kept = f"What was finished is kept: {room}choose other folders (--results, --work)"
     return complain(f"{error}. {kept}", prog=prog)
+
+
+NO_MEMORY = (
+    "there is no memory for such a run: choose fewer --seeds, a smaller --algorithm.horizon, or smaller "
+    "--network.hidden-sizes"
+)
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Return whether an error means that there is no memory; torch makes a RuntimeError of it.
+
+    Example:
+        >>> lacks_memory(MemoryError()), lacks_memory(RuntimeError("shapes differ"))
+        (True, False)
+    """
+    return isinstance(error, MemoryError) or "can't allocate memory" in str(error)
 
 
 def is_ours(error: BaseException) -> bool:

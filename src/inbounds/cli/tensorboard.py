@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from inbounds.cli.errors import CommandError
 from inbounds.learning import Trainer
+from inbounds.learning.storage.whole_files import is_disk_full
 from inbounds.learning.training import Record
 
 _NOT_CURVES = ("epoch", "env_steps")
@@ -38,6 +39,10 @@ class TensorBoardWriter:
         try:
             self._writers = [make(str(directory / f"seed-{seed}"), purge_step=0) for seed in seeds]
         except OSError as error:
+            if is_disk_full(error):
+                raise CommandError(
+                    f"the disk is full: {directory} cannot be written. Make room first"
+                ) from error
             raise CommandError(
                 f"{directory} cannot hold TensorBoard's files ({error.strerror or error}): "
                 "move it away, or choose another --out"
@@ -51,7 +56,11 @@ class TensorBoardWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for writer in self._writers:
-            writer.close()
+            try:
+                writer.close()
+            except OSError:
+                if error is None:  # else that one says more
+                    raise
 
     def __call__(self, trainer: Trainer, record: Record) -> None:
         """Write what is new; the first time, all."""

@@ -16,7 +16,7 @@ from typing import Any
 import gymnasium
 
 from inbounds import robots  # its names are imported on first use, and MuJoCo with them
-from inbounds.cli.errors import CommandError, is_ours
+from inbounds.cli.errors import NO_MEMORY, CommandError, is_ours, lacks_memory
 from inbounds.cli.modules import find_modules_here, module_of
 from inbounds.cli.options import Train, format_seeds, quoted
 from inbounds.cli.progress import TrainingProgress
@@ -33,7 +33,7 @@ from inbounds.learning.storage.run_store import (
     save_run,
 )
 from inbounds.learning.storage.stored_config import FREE_TO_CHANGE, changed_fields
-from inbounds.learning.storage.whole_files import DamagedFileError, held, is_disk_full
+from inbounds.learning.storage.whole_files import DamagedFileError, held, is_disk_full, remove_leftovers
 from inbounds.learning.training import Record, make_environments, prepare
 from inbounds.learning.updates.engine import compiled_engine
 from inbounds.robots.registration import TASK_NAMES
@@ -142,6 +142,8 @@ class _Session:
                 anew = "" if goes_on else f"; {config.env} cannot save its state, so new episodes begin"
                 progress.say(f"going on with {self.run_dir}, {_epochs(start)} done{anew}")
             progress.start_clock()
+            for name in (CURVES_FILE, POLICIES_FILE):
+                remove_leftovers(self.folder / name)  # of a process that was killed while it wrote
             try:
                 with self.stop.listening(progress.say_stopping):
                     trainer = train(
@@ -166,7 +168,9 @@ class _Session:
                 if not (is_ours(error) or is_disk_full(error)):
                     raise  # the environment's own
                 raise self._unwritten(error) from error
-            except (Exception, SystemExit):  # the environment's own, too
+            except (Exception, SystemExit) as error:  # the environment's own, too
+                if lacks_memory(error):
+                    raise CommandError(f"{NO_MEMORY}. {self._kept('Training stopped')}") from error
                 progress.say(self._kept("stopped by an error"))
                 raise
         return self._conclude(trainer, start)

@@ -26,7 +26,7 @@ from inbounds.learning.storage.parquet import read_about, read_table
 from inbounds.learning.storage.run_metadata import metadata_of
 from inbounds.learning.storage.run_store import COLUMNS as OF_A_RUN
 from inbounds.learning.storage.stored_config import changed_fields
-from inbounds.learning.storage.whole_files import DamagedFileError, file_lock, write_whole
+from inbounds.learning.storage.whole_files import DamagedFileError, file_lock, remove_leftovers, write_whole
 from inbounds.study.cell import Cell, digest_of
 
 ROOT = Path(__file__).resolve().parents[3]  # src/inbounds/study/store.py
@@ -186,7 +186,8 @@ class StudyFolder:
     def checksums(self) -> dict[str, str]:
         """Return SHA-256 by file name, relative to the results; empty if there is no list."""
         try:
-            lines = (self.results / CHECKSUMS_FILE).read_text().splitlines()
+            # A damaged list names no file, and `damaged_files` says so.
+            lines = (self.results / CHECKSUMS_FILE).read_text("utf8", "replace").splitlines()
         except FileNotFoundError:
             return {}
         return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}
@@ -198,10 +199,12 @@ class StudyFolder:
         with file_lock(self.results / ".lock"):
             sums = self.checksums() | new
             lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
+            remove_leftovers(self.results / CHECKSUMS_FILE)
             write_whole(self.results / CHECKSUMS_FILE, lines.encode())
             # Below the lock: of two writers of a file the last one's sum holds.
             for path, data in contents.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
+                remove_leftovers(path)
                 write_whole(path, data)
 
     def _name(self, path: Path) -> str:

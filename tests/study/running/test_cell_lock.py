@@ -84,8 +84,11 @@ def test_who_was_taken_over_notices_and_leaves_the_new_holder_alone(tmp_path: Pa
     assert read_claim(tmp_path)["host"] == "elsewhere"  # type: ignore[index]
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"pid": 1}'])
-def test_a_file_cut_short_claims_nothing(tmp_path: Path, text: str) -> None:
+NO_NUMBERS = '{"host": "x", "pid": "q", "started": 1, "renewed": "z"}'
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"pid": 1}', NO_NUMBERS])
+def test_a_file_that_cannot_be_understood_claims_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE_NAME).write_text(text)
     assert read_claim(tmp_path) is None
     CellLock.take(tmp_path).release()

@@ -1,3 +1,4 @@
+import errno
 import io
 import math
 import os
@@ -121,12 +122,15 @@ def test_a_killed_process_costs_a_few_epochs_and_changes_nothing(tmp_path: Path)
     assert run_cell(cells_of(30)[1], folder) == "finished"  # the claim of the dead falls at once
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+WISHES = [signal.SIGINT, *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGTERM, signal.SIGHUP))]
+
+
+@pytest.mark.parametrize("number", WISHES)
 def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signal.Signals) -> None:
     folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
     process = start(tmp_path, 100_000, jobs=1)
     wait_until(lambda: (read_claim(folder.work_of(cell)) or {}).get("epoch"))
-    if number == signal.SIGINT:
+    if number != signal.SIGTERM:
         os.killpg(process.pid, number)  # as a terminal does
     else:
         process.send_signal(number)
@@ -135,6 +139,35 @@ def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signa
     assert "stopping after the epochs under way" in said
     assert f"{cell.id}: stopped" in said
     assert "Traceback" not in said
+    assert has_checkpoint(folder, cell)
+    assert read_claim(folder.work_of(cell)) is None
+
+
+def test_a_wish_to_stop_that_ends_the_reader_too_is_granted(tmp_path: Path) -> None:
+    folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
+    process = start(tmp_path, 100_000, jobs=1)
+    wait_until(lambda: (read_claim(folder.work_of(cell)) or {}).get("epoch"))
+    assert process.stdout is not None
+    process.stdout.close()  # `inbounds study run | tee log`, and Ctrl-C
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(60) == 128 + signal.SIGINT
+    assert has_checkpoint(folder, cell)
+
+
+def test_output_that_cannot_be_written_stops_the_cells_after_their_epoch(tmp_path: Path) -> None:
+    class Unread(StudyProgress):
+        def update(self, running: Any) -> None:
+            super().update(running)
+            if running and self._epochs[cell.id]:
+                self.say("an epoch is done")
+
+    class Full(io.StringIO):
+        def write(self, text: str) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    folder, cell = folder_in(tmp_path), small_cell(epochs=100_000)
+    with pytest.raises(OSError, match="No space left"):
+        run_study([cell], folder, Settings(jobs=1), Unread([cell], folder, Console(file=Full())))
     assert has_checkpoint(folder, cell)
     assert read_claim(folder.work_of(cell)) is None
 

@@ -184,7 +184,14 @@ def test_rows_carry_what_they_were_made_with(tmp_path: Path) -> None:
 
 
 def test_stopping_and_going_on_changes_nothing(tmp_path: Path, whole: pa.Table) -> None:
-    folder = folder_in(tmp_path)
+    folder, cell = folder_in(tmp_path), small_cell()
+    names = (checkpoint.FILE_NAME, folder.policy_files(cell)[0].name)
+    left = [
+        folder.work_of(cell) / f".{name}.0123abcd.partial" for name in names
+    ]  # of a process that was killed
+    left[0].parent.mkdir(parents=True)
+    for each in left:
+        each.touch()
     for epochs in (3, 9, 1):  # stops within, at and after a measurement
         assert run_cell(small_cell(), folder, stop=stop_after(epochs)) == "stopped"
         assert not folder.cell_file(small_cell()).exists()
@@ -192,6 +199,7 @@ def test_stopping_and_going_on_changes_nothing(tmp_path: Path, whole: pa.Table) 
     assert first_mismatch(whole, rows_of(folder)) == ""
     sessions = read_metadata(folder.cell_file(small_cell()))["sessions"]
     assert [session["from_epoch"] for session in sessions] == [0, 3, 12, 13]
+    assert not any(each.exists() for each in left)
     assert not list(folder.work.glob("**/checkpoint.pt"))
 
 

@@ -127,6 +127,21 @@ def test_a_changed_byte_a_missing_and_a_foreign_file_are_found(folder: StudyFold
     ]
 
 
+def test_a_list_of_checksums_that_is_no_text_is_found(folder: StudyFolder) -> None:
+    (folder.results / store.CHECKSUMS_FILE).write_bytes(b"\xff\xfe")
+    assert folder.state(CELL) == "damaged"
+    assert bad(verify([CELL], folder, rerun=()))
+
+
+def test_what_a_killed_process_left_half_written_goes_with_the_next_result(folder: StudyFolder) -> None:
+    path = folder.cell_file(CELL)
+    left = [p.with_name(f".{p.name}.0123abcd.partial") for p in (path, folder.results / store.CHECKSUMS_FILE)]
+    for each in left:
+        each.touch()
+    folder.publish({path: path.read_bytes()})
+    assert not any(each.exists() for each in left)
+
+
 @pytest.mark.parametrize(
     ("name", "made"),
     [

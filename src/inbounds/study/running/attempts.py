@@ -15,7 +15,8 @@ from inbounds.study.running.cell_lock import ClaimedError
 from inbounds.study.running.one_cell import DiskFullError, StudyError, run_cell
 from inbounds.study.store import StudyFolder
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)  # Ctrl-C, and what job schedulers send
+# Ctrl-C, what job schedulers send, and a closed terminal.
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
 RETRIES = 2  # of a cell whose process died
 OTHER_FOLDERS = "choose other folders with --results and --work"
 
@@ -103,7 +104,9 @@ def attempt(cell: Cell, folder: StudyFolder, stop: Any, deadline: float) -> Cell
 def handling(take: Any) -> Iterator[None]:
     """Handle the signals that ask to stop; does nothing outside the main thread, which gets no signals."""
     try:
-        before = {number: signal.signal(number, take) for number in SIGNALS}
+        # Under nohup a closed terminal is ignored.
+        heard = [n for n in SIGNALS if n.name != "SIGHUP" or signal.getsignal(n) != signal.SIG_IGN]
+        before = {number: signal.signal(number, take) for number in heard}
     except ValueError:
         yield
         return

@@ -115,8 +115,9 @@ def read_claim(folder: Path) -> dict[str, Any] | None:
     """Return a cell's claim, None if there is none; a file that cannot be understood counts as none."""
     try:
         claim = json.loads((folder / FILE_NAME).read_text())
-        return claim if {"host", "pid", "started", "renewed"} <= claim.keys() else None
-    except (FileNotFoundError, ValueError, AttributeError):
+        int(claim["pid"]), float(claim["renewed"])
+        return claim if {"host", "started"} <= claim.keys() else None
+    except (FileNotFoundError, ValueError, TypeError, KeyError, AttributeError, OverflowError):
         return None
 
 

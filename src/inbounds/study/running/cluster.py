@@ -94,6 +94,9 @@ def _run(
     again: list[tuple[float, Cell]] = []
     failures: dict[str, int] = {}
     while pending or again:
+        if progress.unsaid is not None:  # nobody reads the output, or it cannot be written
+            with contextlib.suppress(OSError):
+                stop()
         with contextlib.suppress(NothingYet):
             if pending:
                 wait(list(pending), timeout=1.0, return_when="FIRST_COMPLETED")

@@ -55,7 +55,8 @@ def run_study(
 ) -> Summary:
     """Run cells in their order, finished ones not again. Running it again goes on where it stopped.
 
-    The first Ctrl-C (or SIGTERM) has running cells end their epoch, save and stop; the second kills them.
+    The first Ctrl-C (or SIGTERM, or a closed terminal) has running cells end their epoch, save and stop; so does output
+    that nobody reads any more (`| head`). The second kills them.
 
     Args:
         cells: which.
@@ -75,8 +76,12 @@ def run_study(
     settings = settings or Settings()
     with progress or StudyProgress(cells, folder) as shown:
         if settings.scheduler is not None:
-            return run_on_cluster(cells, folder, settings, shown)
-        return _LocalRun(cells, folder, settings, shown).run()
+            summary = run_on_cluster(cells, folder, settings, shown)
+        else:
+            summary = _LocalRun(cells, folder, settings, shown).run()
+    if shown.unsaid is not None and not summary.signal:
+        raise shown.unsaid
+    return summary
 
 
 class _Running(NamedTuple):
@@ -103,10 +108,14 @@ class _LocalRun:
 
     def run(self) -> Summary:
         """Start, watch and end processes until nothing is left to do."""
+        unheard = False  # nobody reads the output, or it cannot be written
         with self._listening():
             try:
                 while self.waiting or self.running:
-                    if self.signal or time.time() > self.deadline:
+                    if self.progress.unsaid is not None and not self.signal and not unheard:
+                        unheard = True
+                        self._stop_cells()
+                    if self.signal or unheard or time.time() > self.deadline:
                         self.waiting.clear()
                     while self.waiting and len(self.running) < self.jobs and not self.signal:
                         self._start(self.waiting.popleft())
@@ -186,12 +195,16 @@ class _LocalRun:
             if self.signal:
                 raise KeyboardInterrupt
             self.signal = number
+            self._stop_cells()
             self.progress.say("stopping after the epochs under way; again to stop at once")
-            for running in self.running:
-                running.process.terminate()
 
         with handling(take):
             yield
+
+    def _stop_cells(self) -> None:
+        """Have the running cells end their epoch, save and stop."""
+        for running in self.running:
+            running.process.terminate()
 
 
 def _run_in_child(

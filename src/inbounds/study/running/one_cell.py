@@ -21,7 +21,7 @@ import safetensors
 from inbounds.learning.storage import checkpoint
 from inbounds.learning.storage.parquet import parquet_bytes
 from inbounds.learning.storage.run_store import load_checkpoint, save_policies
-from inbounds.learning.storage.whole_files import DamagedFileError, is_disk_full
+from inbounds.learning.storage.whole_files import DamagedFileError, is_disk_full, remove_leftovers
 from inbounds.study import store
 from inbounds.study.grid import Cell
 from inbounds.study.running.cell_lock import CellLock
@@ -116,6 +116,8 @@ class _CellRun:
     def __init__(self, cell: Cell, folder: StudyFolder, claim: CellLock) -> None:
         self.cell, self.folder, self.claim = cell, folder, claim
         self.work = folder.work_of(cell)
+        for name in (checkpoint.FILE_NAME, folder.policy_files(cell)[0].name):
+            remove_leftovers(self.work / name)  # of a part that was killed while it wrote
         self.run_ = MeasuredTrainer(cell)
         with contextlib.ExitStack() as undone:
             undone.callback(self.run_.close)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -38,6 +39,8 @@ class StudyProgress:
         self._ended = 0
         self._last_line = time.monotonic()
         self._tasks: dict[str, TaskID] = {}
+        self.unsaid: BaseException | None = None
+        """Why something could not be said: a reader that has gone, a full disk. The cells save before it is raised."""
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -57,19 +60,21 @@ class StudyProgress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        with self._noting():
+            self._progress.stop()
 
     def update(self, running: Sequence[Cell]) -> None:
         """Look how far the running cells are."""
-        for cell in running:
-            claim = read_claim(self.folder.work_of(cell)) or {}
-            epoch = int(claim.get("epoch", self._epochs[cell.id]))
-            if cell.id not in self._tasks:
-                self._tasks[cell.id] = self._progress.add_task(
-                    f"  {cell.id}", total=cell.epochs, completed=epoch
-                )
-            self._progress.update(self._tasks[cell.id], completed=epoch)
-            self._epochs[cell.id] = epoch
+        with self._noting():
+            for cell in running:
+                claim = read_claim(self.folder.work_of(cell)) or {}
+                epoch = int(claim.get("epoch", self._epochs[cell.id]))
+                if cell.id not in self._tasks:
+                    self._tasks[cell.id] = self._progress.add_task(
+                        f"  {cell.id}", total=cell.epochs, completed=epoch
+                    )
+                self._progress.update(self._tasks[cell.id], completed=epoch)
+                self._epochs[cell.id] = epoch
         self._progress.update(self._all, completed=sum(self._epochs.values()))
         if not self.console.is_terminal and time.monotonic() - self._last_line > SECONDS_BETWEEN_LINES:
             self._last_line = time.monotonic()
@@ -88,7 +93,16 @@ class StudyProgress:
 
     def say(self, text: str) -> None:
         """Write a line, above the bars."""
-        self.console.print(text, markup=False, soft_wrap=True)
+        with self._noting():
+            self.console.print(text, markup=False, soft_wrap=True)
+
+    @contextlib.contextmanager
+    def _noting(self) -> Iterator[None]:
+        """Note what goes wrong, of which no cell may die; Rich makes a SystemExit of a reader that has gone."""
+        try:
+            yield
+        except (OSError, SystemExit) as error:
+            self.unsaid = self.unsaid or error
 
     def _title(self) -> str:
         return f"{self._ended}/{len(self._epochs)} cells"
