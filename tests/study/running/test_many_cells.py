@@ -21,7 +21,7 @@ from inbounds.cli.studying import study
 from inbounds.learning.storage import checkpoint
 from inbounds.study import Cell, Settings, StudyFolder, read_cell, run_cell, run_study, store
 from inbounds.study.grid import select
-from inbounds.study.running import cluster, many_cells
+from inbounds.study.running import attempts, cluster, many_cells
 from inbounds.study.running.attempts import RETRIES, CellReport
 from inbounds.study.running.cell_lock import CellLock, read_claim
 from inbounds.study.running.many_cells import commit_cell
@@ -31,12 +31,14 @@ from inbounds.study.store import read_metadata
 from tests.study.small import folder_in, small_cell
 
 RUN = """
+import signal
 import sys
 from pathlib import Path
 from inbounds.study import Settings, run_study
 from tests.study.small import folder_in, small_cell
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
     cells = [small_cell(family=family, epochs=EPOCHS) for family in ("gaussian", "beta", "logit-normal")]
     summary = run_study(cells, folder_in(Path(sys.argv[1])), Settings(jobs=int(sys.argv[2])))
     sys.exit(128 + summary.signal if summary.signal else bool(summary.failed))
@@ -141,6 +143,17 @@ def test_a_wish_to_stop_is_granted_after_the_epoch(tmp_path: Path, number: signa
     assert "Traceback" not in said
     assert has_checkpoint(folder, cell)
     assert read_claim(folder.work_of(cell)) is None
+
+
+@pytest.mark.parametrize("set_before", [signal.SIG_IGN, signal.SIG_DFL], ids=["nohup", "terminal"])
+def test_a_closed_terminal_is_a_wish_to_stop_except_under_nohup(set_before: signal.Handlers) -> None:
+    found = signal.signal(signal.SIGHUP, set_before)
+    try:
+        with attempts.handling(lambda *_: None):
+            assert (signal.getsignal(signal.SIGHUP) == signal.SIG_IGN) == (set_before == signal.SIG_IGN)
+        assert signal.getsignal(signal.SIGHUP) == set_before
+    finally:
+        signal.signal(signal.SIGHUP, found)
 
 
 def test_a_wish_to_stop_that_ends_the_reader_too_is_granted(tmp_path: Path) -> None:
