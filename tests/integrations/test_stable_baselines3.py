@@ -11,6 +11,8 @@ from sb3_contrib import TRPO, RecurrentPPO
 from scipy import integrate, stats
 from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.distributions import kl_divergence
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import nn
 
 from inbounds.integrations.stable_baselines3 import (
     LogitNormalActor,
@@ -222,9 +224,20 @@ class Seen(gymnasium.Env):
         return self.observation_space.sample(), 0.0, False, False, {}
 
 
-def test_observations_may_be_pictures() -> None:
-    model = PPO(LogitNormalPolicy, Seen(), n_steps=16, batch_size=16, n_epochs=1, device="cpu", seed=0)
-    peer = PPO("CnnPolicy", Seen(), n_steps=16, batch_size=16, n_epochs=1, device="cpu", seed=0)
+class Scaled(Seen):
+    """The same, scaled to [0, 1], channels first."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.observation_space = spaces.Box(0, 1, (3, 36, 36), np.float32)
+
+
+@pytest.mark.parametrize("seen", [Seen, Scaled])
+def test_observations_may_be_pictures(seen: type[Seen]) -> None:
+    small = {"n_steps": 16, "batch_size": 16, "n_epochs": 1, "device": "cpu", "seed": 0}
+    options = {"policy_kwargs": {"normalize_images": seen is Seen}}
+    model = PPO(LogitNormalPolicy, seen(), **small, **options)
+    peer = PPO("CnnPolicy", seen(), **small, **options)
     kinds = [type(each) for each in model.policy.modules() if not isinstance(each, LogitNormalPolicy)]
     assert kinds == [type(each) for each in list(peer.policy.modules())[1:]]
     model.learn(16)
@@ -261,6 +274,29 @@ def test_what_is_deployed_does_what_the_model_does(shared: bool) -> None:
     assert ((expected > LOW) & (expected < HIGH)).all()
     latents = model.policy(given, deterministic=True)[0]  # the trap: no actions
     assert not np.allclose(latents.detach().numpy(), expected)
+
+
+class Forgetful(BaseFeaturesExtractor):
+    """Dropout before the heads."""
+
+    def __init__(self, space: spaces.Box) -> None:
+        super().__init__(space, 16)
+        self.net = nn.Sequential(nn.Linear(space.shape[0], 16), nn.Dropout(0.5))
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        return self.net(obs)
+
+
+def test_what_is_deployed_after_learning_forgets_nothing() -> None:
+    options = {"features_extractor_class": Forgetful}
+    model = PPO(LogitNormalPolicy, Tank(), policy_kwargs=options, **SMALL).learn(128)
+    with torch.no_grad():
+        model.policy.action_net.weight.mul_(100)
+        actor, obs = LogitNormalActor(model.policy), torch.ones(1, Tank().observation_space.shape[0])
+        drawn = [actor(obs) for _ in range(3)]
+    assert torch.equal(drawn[0], drawn[1])
+    assert torch.equal(drawn[0], drawn[2])
+    np.testing.assert_array_equal(drawn[0].numpy(), model.predict(obs.numpy(), deterministic=True)[0])
 
 
 def test_another_policy_is_not_deployed() -> None:

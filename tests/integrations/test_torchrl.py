@@ -19,7 +19,7 @@ with warnings.catch_warnings():  # the library warns of its own deprecations whi
     from torchrl.envs import GymWrapper
     from torchrl.envs.utils import ExplorationType, set_exploration_type
     from torchrl.modules import NormalParamExtractor, TanhNormal, ValueOperator
-    from torchrl.objectives import ClipPPOLoss
+    from torchrl.objectives import ClipPPOLoss, ReinforceLoss
 
 from inbounds.distributions import ClippedNormal, LogitNormal, ScaledBeta
 from inbounds.integrations.torchrl import PARAMETERS, Latents, bounded_actor, quiet_actor
@@ -103,6 +103,24 @@ def test_at_the_old_policy_the_loss_has_the_policy_gradient(law: type) -> None:
         assert torch.allclose(ours, theirs, atol=1e-6)
     entropy = actor.get_dist(batch).entropy().mean()  # exact: TorchRL need not sample for it
     assert torch.allclose(found["entropy"], entropy, atol=1e-5)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_reinforce_scores_latents_once_it_is_told(law: type) -> None:
+    actor, acting = bounded_actor(network(law), law, LOW, HIGH)
+    with torch.no_grad():
+        batch = acting(observations(64))
+    batch["advantage"] = torch.randn(64, 1, generator=torch.Generator().manual_seed(2))
+    batch["value_target"] = torch.zeros(64, 1)
+    loss = ReinforceLoss(actor, ValueOperator(nn.Linear(2, 1)))
+    assert loss.tensor_keys.action == "action"  # else the docstring need not speak of it
+    loss.set_keys(action="latent")
+    parameters = list(loss.actor_network_params.values(True, True))
+    gradient = torch.autograd.grad(loss(batch)["loss_actor"], parameters)
+    log_prob = actor.get_dist(batch).log_prob(batch["latent"])
+    direct = torch.autograd.grad(-(batch["advantage"][:, 0] * log_prob).mean(), list(actor.parameters()))
+    for ours, theirs in zip(sorted(gradient, key=_key), sorted(direct, key=_key), strict=True):
+        assert torch.allclose(ours, theirs, atol=1e-6)
 
 
 def _key(tensor: torch.Tensor) -> tuple:
@@ -295,7 +313,7 @@ def test_a_narrow_box_needs_a_network_that_resolves_it() -> None:
 
 
 def test_bounds_of_several_axes_are_refused_and_one_name_will_do() -> None:
-    with pytest.raises(ValueError, match=r"the shape \[2, 2\].* flatten"):
+    with pytest.raises(ValueError, match=r"the shape \[2, 2\].*action_spec_unbatched\.space.* flatten"):
         bounded_actor(network(LogitNormal), LogitNormal, -np.ones((2, 2)), np.ones((2, 2)))
     actor, _ = bounded_actor(network(LogitNormal), LogitNormal, LOW, HIGH, in_keys="observation")
     assert actor(observations(3))["latent"].shape == (3, 2)

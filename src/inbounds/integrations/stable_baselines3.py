@@ -144,7 +144,9 @@ class LogitNormalPolicy(ActorCriticPolicy):
             raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
         if isinstance(observation_space, gymnasium.spaces.Dict):  # as the peer's `MultiInputPolicy`
             options.setdefault("features_extractor_class", CombinedExtractor)
-        elif is_image_space(observation_space):  # as the peer's `CnnPolicy`
+        elif is_image_space(  # as the peer's `CnnPolicy`
+            observation_space, normalized_image=not options.get("normalize_images", True)
+        ):
             options.setdefault("features_extractor_class", NatureCNN)
         super().__init__(observation_space, action_space, lr_schedule, **options)
         self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
@@ -225,6 +227,7 @@ class LogitNormalActor(nn.Module):
             policy.mlp_extractor,
             policy.action_net,
         )
+        self.eval()  # `learn` leaves the layers in training mode, in which dropout is random
         low, high = policy._limits(next(policy.action_net.parameters()))
         smallest, largest = open_ends(low, high)
         bounds = {"low": low, "high": high, "smallest": smallest, "largest": largest}

@@ -12,8 +12,9 @@ environment:
 
 `quiet_actor` makes the two with a quiet start: centred in the box, with as much executed noise as is asked for.
 
-The first is for on-policy losses, such as `ClipPPOLoss` and `A2CLoss`; the second for rollouts and collectors. A loss
-that draws actions itself, such as `SACLoss`, can use neither.
+The first is for on-policy losses, such as `ClipPPOLoss` and `A2CLoss`; the second for rollouts and collectors.
+`ReinforceLoss` does not ask the actor for its keys, and would score actions as latents: call
+`loss.set_keys(action="latent")` first. A loss that draws actions itself, such as `SACLoss`, can use neither.
 
 Importing TorchRL switches off the checks of arguments of *every* torch distribution, those of this package included: an
 action beyond its bounds then raises nothing. `torch.distributions.Distribution.set_default_validate_args` switches them
@@ -177,8 +178,9 @@ def bounded_actor(
     low, high = require_bounds(low, high, first.dtype)  # once: TorchRL switches off every later check
     if low.dim() > 1:
         raise ValueError(
-            f"the bounds have the shape {list(low.shape)}, and an action is a vector: flatten the box with "
-            "gymnasium.wrappers.TransformAction, and give bounds of the shape [A]"
+            f"the bounds have the shape {list(low.shape)}, and an action is a vector: of a batch of environments give "
+            "those of env.action_spec_unbatched.space; else flatten the box with gymnasium.wrappers.TransformAction, "
+            "and give bounds of the shape [A]"
         )
     names, in_keys = PARAMETERS[law], [in_keys] if isinstance(in_keys, str) else list(in_keys)
 
