@@ -6,8 +6,8 @@ that one broken line fails one of them:
 
 | Check       | What must hold                                                       |
 |-------------|----------------------------------------------------------------------|
-| direction   | the step is parallel to (F + c_F Id)⁻¹ b                                 |
-| length      | ½ Δᵀ(F + c_F Id)Δ = D, where the line search has nothing to do           |
+| direction   | the step is parallel to (F + c_F Id)⁻¹ b                           |
+| length      | ½ Δᵀ(F + c_F Id)Δ = D, where the line search has nothing to do     |
 | trust       | where the quadratic model fails, the exact KL divergence stays ≤ D   |
 | improvement | where the linear model fails, the surrogate still goes up            |
 | refusal     | where no length will do, the parameters stay as they were            |
