@@ -9,6 +9,7 @@ import pytest
 
 from inbounds.book.exercises.judging import Judgement
 from inbounds.book.pages import programs
+from inbounds.cli.classroom.grading import graders_shown
 from tools import student_copies
 
 FOLDER = Path(student_copies.ROOT) / "tools" / "build"
@@ -65,6 +66,13 @@ def test_a_grader_follows_each_blank(path: Path) -> None:
         if stub := STUB.search(source):
             assert f"({stub[1]})" in sources[number + 1]
             assert '"""' in source
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
+def test_a_class_s_table_has_a_row_for_each_judgement(path: Path) -> None:
+    judged = [source for source in code_of(path) if re.fullmatch(r"[\w.]+\(\w+\)", source)]
+    assert judged
+    assert list(graders_shown(path).values()) == [source.partition("(")[0].split(".")[1] for source in judged]
 
 
 def test_they_are_handed_out() -> None:

@@ -1,6 +1,10 @@
 """How any exercise is judged: no answer is not a failure, an exception is reported, a verdict shows itself."""
 
+from collections.abc import Callable
+
+import numpy as np
 import pytest
+import torch
 
 from inbounds.book.exercises.judging import Case, Judgement, judge_cases, judge_diagnosis
 
@@ -16,6 +20,26 @@ def test_right_known_and_unknown_mistakes() -> None:
     assert judge_cases(lambda x: x * x, SQUARE, "right").passed is True
     assert judge_cases(lambda x: 2 * x, SQUARE, "right").message == "that is the double"
     assert judge_cases(lambda x: x, SQUARE, "right").message == "the value is wrong: expected 9, got 3"
+
+
+def test_a_number_in_a_list_is_told_its_shape() -> None:
+    verdict = judge_cases(lambda x: [x * x], SQUARE, "right")
+    assert verdict.passed is False
+    assert verdict.message == "the value is wrong: the number is to have the shape [], got [1]"
+
+
+@pytest.mark.parametrize("kind", [np.array, torch.tensor])
+def test_an_argument_is_to_stay_as_it_was(kind: Callable) -> None:
+    def doubled(x, work):
+        work *= 2
+        return work
+
+    case = Case((kind([1.0, np.nan]), kind([1.0, 2.0])), [2.0, 4.0], {})
+    verdict = judge_cases(doubled, [case], "right")
+    assert verdict.passed is False
+    assert "changes an array that it was given" in verdict.message
+    case = Case((kind([1.0, np.nan]), kind([1.0, 2.0])), [2.0, 4.0], {})
+    assert judge_cases(lambda x, work: 2 * work, [case], "right").passed is True
 
 
 def test_an_exception_is_reported() -> None:

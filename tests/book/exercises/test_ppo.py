@@ -115,6 +115,23 @@ def test_a_surrogate_that_never_stops_paying_is_seen() -> None:
     assert 'check "stops paying"' in graders.loss(loss).message
 
 
+def test_a_loss_that_normalises_in_place_is_told_so() -> None:
+    def loss(policy, critic, batch, advantage, *rest):
+        advantage -= advantage.mean()
+        return loss_with()(policy, critic, batch, advantage, *rest)
+
+    assert "it changes the advantages given to it" in graders.loss(loss).message
+
+
+def test_a_loss_may_ask_the_law_itself() -> None:
+    def loss(policy, critic, batch, *rest):
+        density = policy.law(policy.net(batch.obs)).log_prob(batch.latent).sum(-1)
+        torch.testing.assert_close(density, policy.log_prob(batch.obs, batch.latent))
+        return loss_with()(policy, critic, batch, *rest)
+
+    assert graders.loss(loss).passed is True
+
+
 def test_the_checks_say_when_a_loss_is_not_written_or_raises() -> None:
     assert graders.loss(lambda *_: ...).passed is None
     verdict = graders.loss(lambda policy, *_: policy.net(torch.zeros(2)))
@@ -171,6 +188,9 @@ def update_with(change: str = "") -> Callable[..., None]:
             options = {"clip_range": 0.2, "entropy_coef": 1e-4, "value_coef": 0.5}
         advantage, to_go = right_advantages(batch, critic)
         old = policy.log_prob(batch.obs, batch.latent).detach()
+        if change == "own law":
+            outputs = policy.net(batch.obs).detach()
+            old = policy.law(outputs).log_prob(batch.latent).sum(-1)
         if change == "whole":
             advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         if change == "swapped":
@@ -178,6 +198,8 @@ def update_with(change: str = "") -> Callable[..., None]:
         once = torch.randperm(len(old))
         for epoch in range(1 if change == "one pass" else passes):
             order = once if epoch == 0 or change == "one order" else torch.randperm(len(old))
+            if change == "on and on" and epoch:
+                once = order = once[order]
             advantage, to_go = (
                 right_advantages(batch, critic) if change == "each pass" else (advantage, to_go)
             )
@@ -198,7 +220,8 @@ def update_with(change: str = "") -> Callable[..., None]:
                 if change != "accumulate":
                     adam.zero_grad()
                 mine = policy.log_prob(few.obs, few.latent).detach() if change == "own" else old[index]
-                loss_with()(policy, critic, few, part, target, mine, **options).backward()
+                factor = {"factor": 16, "accumulated": 1 / 4}.get(change, 1)
+                (factor * loss_with()(policy, critic, few, part, target, mine, **options)).backward()
                 if change == "emptied":
                     adam.zero_grad()
                 both = [*policy.net.parameters()], [*critic.parameters()]
@@ -210,8 +233,9 @@ def update_with(change: str = "") -> Callable[..., None]:
     return update
 
 
-def test_a_right_update_ends_where_the_package_ends() -> None:
-    verdict = graders.update(update_with())
+@pytest.mark.parametrize("way", ["", "own law", "on and on"])
+def test_a_right_update_ends_where_the_package_ends(way: str) -> None:
+    verdict = graders.update(update_with(way))
     assert verdict.passed is True, verdict
 
 
@@ -239,6 +263,8 @@ def test_a_right_update_ends_where_the_package_ends() -> None:
         ("swapped", "the advantages first"),
         ("emptied", "without a gradient, and nothing moved: zero_grad, backward"),
         ("whole targets", "piece meets a whole batch"),
+        ("factor", "no factor before the loss"),
+        ("accumulated", "no factor before the loss"),
     ],
 )
 def test_known_mistakes_of_an_update_are_named(change: str, words: str) -> None:

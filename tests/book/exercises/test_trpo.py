@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import torch
+from torch.distributions import kl_divergence
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from inbounds.book.exercises import trpo as graders
@@ -286,7 +287,8 @@ def update(policy, critic, adam, batch, max_kl, passes, size, *, flaw=""):
         return right_surrogate(policy, batch, advantage, old)
 
     def mean_kl():
-        each = policy.kl(old_outputs, batch.obs)
+        laws = policy.law(old_outputs), policy.law(policy.net(batch.obs))
+        each = kl_divergence(*laws[:: -1 if flaw == "turned round" else 1]).sum(-1)
         return each if flaw == "no mean" else each.mean()
 
     weights = list(policy.net.parameters())
@@ -318,6 +320,7 @@ def exact_iterate(gain, mean_kl, weights, max_kl):
         ("swapped", "*first* of the two that `advantages` returns"),
         ("own density", ".detach() the old log-probabilities"),
         ("no mean", "a .mean() is missing"),
+        ("turned round", "mean_kl() is KL(old‖new)"),
     ],
 )
 def test_an_update_is_judged_by_both_networks(flaw: str, words: str) -> None:

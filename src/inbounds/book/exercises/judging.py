@@ -77,6 +77,7 @@ def judge_cases(function: Callable[..., Any], cases: list[Case], success: str) -
     """
     name = getattr(function, "__name__", "your function")
     for case in cases:
+        given = [_copied(each) for each in case.arguments]
         try:
             answer = detached(function(*case.arguments))
         except Exception as error:
@@ -85,6 +86,9 @@ def judge_cases(function: Callable[..., Any], cases: list[Case], success: str) -
             return Judgement(name, None, "it returns nothing: write it, with a return at the end")
         if answer is ... or answer is NotImplemented:
             return Judgement(name, None, "write it, and run this cell again")
+        left = [_copied(each) for each in case.arguments]
+        if not all(map(_alike, given, left)):
+            return Judgement(name, False, "it changes an array that it was given: work on a copy")
         if agrees(answer, case.expected, case.rtol):
             continue
         for diagnosis, wrong in case.mistakes.items():
@@ -179,6 +183,17 @@ def detached(answer: Any) -> Any:
     return type(answer)(map(detached, answer)) if type(answer) in (list, tuple) else answer
 
 
+def _copied(argument: Any) -> np.ndarray | None:
+    """A copy of an array or a tensor; nothing of anything else."""
+    return np.asarray(detached(argument)).copy() if isinstance(argument, (np.ndarray, torch.Tensor)) else None
+
+
+def _alike(before: np.ndarray | None, after: np.ndarray | None) -> bool:
+    if before is None or after is None:
+        return before is after
+    return np.array_equal(before, after, equal_nan=before.dtype.kind in "fc")
+
+
 def agrees(answer: Any, expected: Any, rtol: float) -> bool:
     """Whether two numbers or arrays have the same shape and values."""
     try:
@@ -196,6 +211,8 @@ def _beside(answer: Any, expected: Any, rtol: float) -> str:
         found, right = np.asarray(answer, dtype=np.float64), np.asarray(expected, dtype=np.float64)
     except (TypeError, ValueError):
         found = right = np.zeros(())
+    if found.shape != right.shape and found.size == right.size == 1:
+        return f"the number is to have the shape {list(right.shape)}, got {list(found.shape)}"
     if found.shape != right.shape or found.size < 2:
         return _apart(brief(expected), brief(answer))
     wrong = ~np.isclose(found, right, rtol=rtol, atol=0.0, equal_nan=True)

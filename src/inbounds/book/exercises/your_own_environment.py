@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import VectorEnv
 
 from inbounds.book.exercises.checks.environment import CHECKS, MakeEnvs
 from inbounds.book.exercises.judging import Case, Judgement, judge_by_checks, judge_cases, judge_diagnosis
@@ -56,7 +55,8 @@ def own_environment(make: MakeEnvs) -> Judgement:
     """
 
     def answered() -> bool:
-        return isinstance(make(1), VectorEnv)
+        made = make(1)
+        return made is not None and made is not ...
 
     return judge_by_checks(make, CHECKS, answered, "your environment")
 

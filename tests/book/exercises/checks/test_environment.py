@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -81,6 +82,48 @@ class Clockless(PointEnv):
         return obs, reward, terminated | truncated, np.zeros_like(truncated), info
 
 
+class BothFlags(PointEnv):
+    def step(self, actions):
+        obs, reward, terminated, truncated, info = super().step(actions)
+        return obs, reward, terminated | truncated, truncated, info
+
+
+class Patient(Clockless):
+    """Its clock runs for 1000 steps, and a small box lets no point escape before."""
+
+    def __init__(self, num_envs: int) -> None:
+        super().__init__(num_envs, low=(-0.4, -0.4), high=(0.4, 0.4))
+
+    def _start(self, i: int) -> None:
+        super()._start(i)
+        self.elapsed[i] = -980
+
+
+class DeadTime(PointEnv):
+    """An action is felt four steps later."""
+
+    def step(self, actions):
+        self.waiting = [np.where(self.elapsed[:, None] > k, self.waiting[k], 0) for k in range(4)]
+        self.waiting = [actions, *self.waiting]
+        return super().step(self.waiting.pop())
+
+    def reset(self, **options):
+        self.waiting = [np.zeros((self.num_envs, 2))] * 4
+        return super().reset(**options)
+
+
+class Throw(PointEnv):
+    """Over after one step, in which everything happens."""
+
+    def step(self, actions):
+        obs, reward, terminated, truncated, info = super().step(actions)
+        return obs, reward, truncated, terminated & False, info
+
+    def _start(self, i: int) -> None:
+        super()._start(i)
+        self.elapsed[i] = 19
+
+
 class Summed(PointEnv):
     def step(self, actions):
         obs, reward, *rest = super().step(actions)
@@ -104,13 +147,23 @@ BROKEN = {
     Forgetful: "final observation",
     Silent: "final observation",
     Clockless: "time limit",
+    BothFlags: "time limit",
+    Patient: "time limit",
 }
 
 
-@pytest.mark.parametrize("make", [PointEnv, lambda n: PointEnv(n, low=(-1, -0.5), high=(1, 2))])
+@pytest.mark.parametrize(
+    "make", [PointEnv, DeadTime, Throw, lambda n: PointEnv(n, low=(-1, -0.5), high=(1, 2))]
+)
 def test_a_sound_environment_passes(make: Callable) -> None:
     assert complaints(make) == {}
     assert graders.own_environment(make).passed is True
+
+
+def test_an_environment_of_one_seed_is_told_the_way() -> None:
+    verdict = graders.own_environment(lambda num_envs: gymnasium.make("Pendulum-v1"))
+    assert verdict.passed is False
+    assert "training takes a vector environment" in verdict.message
 
 
 def test_a_coincidence_is_no_fault() -> None:

@@ -33,8 +33,8 @@ MakeEnvs: TypeAlias = Callable[[int], VectorEnv[Any, Any, Any]]
 Check: TypeAlias = Callable[[MakeEnvs], "str | None"]
 """Returns what is wrong, or None."""
 
-SHORT, LONG = 30, 600
-"""Env steps of a quick look, and of one that shall see episodes end."""
+SHORT, LONG = 30, 1100
+"""Env steps of a quick look, and of one that shall see episodes end: some clocks run for 1000."""
 
 
 class Course(NamedTuple):
@@ -145,7 +145,7 @@ def _bounds(make: MakeEnvs) -> str | None:
         for value in (box.low[i], middle[i], box.high[i]):
             action = middle.copy()
             action[i] = value
-            course = run(envs, [0], np.broadcast_to(action, (3, 1, len(middle))))
+            course = run(envs, [0], np.broadcast_to(action, (SHORT, 1, len(middle))))
             outcomes.append(np.concatenate([course.obs[1:].ravel(), course.reward.ravel()]))
         for a, b, where in ((0, 1, "lower"), (1, 2, "upper")):
             if np.array_equal(outcomes[a], outcomes[b]):
@@ -171,7 +171,7 @@ def _final_observation(make: MakeEnvs) -> str | None:
 
 def _time_limit(make: MakeEnvs) -> str | None:
     course = _to_the_end(make)
-    if course.truncated.any():
+    if (course.truncated & ~course.terminated).any():  # with both flags an episode counts as terminated
         return None
     lengths: dict[int, set[int]] = {}  # of episodes; in which environments, each of which acts in its own way
     for n in range(course.reward.shape[1]):
@@ -179,7 +179,7 @@ def _time_limit(make: MakeEnvs) -> str | None:
         for length in np.diff(ends, prepend=-1):
             lengths.setdefault(int(length), set()).add(n)
     longest = max(lengths, default=0)
-    if len(lengths.get(longest, ())) >= 3:  # no accident
+    if longest > 1 and len(lengths.get(longest, ())) >= 3:  # no accident
         return (
             f"no episode is longer than {longest} steps, and those that reach it are called terminated: that is a "
             "clock, hence truncated"

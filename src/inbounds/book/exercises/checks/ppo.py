@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 import torch
 from torch import Tensor, nn
+from torch.distributions import Normal
 
 from inbounds.book.exercises.checks.small_updates import Batch
 from inbounds.learning.families import NORMAL, Limits
@@ -35,6 +36,11 @@ class ScenePolicy:
 
     net: nn.Sequential
     """Observations `[B, O]` to outputs `[B, 2A]`."""
+
+    def law(self, outputs: Tensor) -> Normal:
+        """Return the law of each latent `[B, A]`, of outputs `[B, 2A]`."""
+        parameters = NORMAL.parameters(outputs, Limits())
+        return Normal(parameters.loc, parameters.log_scale.exp())
 
     def log_prob(self, obs: Tensor, latent: Tensor) -> Tensor:
         """Return log-densities `[B]` of latents `[B, A]`."""
@@ -126,7 +132,10 @@ def policy_loss(function: Loss, scene: Scene) -> Tensor:
 
 def _starts_at_one(function: Loss) -> str | None:
     scene = Scene.of(1)
+    given = scene.advantage.clone()
     value = policy_loss(function, scene).detach()
+    if not torch.equal(given, scene.advantage):
+        return "it changes the advantages given to it, as -= and /= do; they come normalised from the update"
     mean = scene.advantage.mean()
     if value.shape != ():
         return f"the loss must be one number, got the shape {list(value.shape)}"

@@ -27,7 +27,7 @@ from inbounds.learning import (
     trpo,
 )
 
-__all__ = ["FAR", "PPO", "QUIET", "SEED", "TRPO", "Batch", "Small", "SmallPolicy", "explained"]
+__all__ = ["EDGE", "FAR", "PPO", "QUIET", "SEED", "TRPO", "Batch", "Small", "SmallPolicy", "explained"]
 
 Batch = namedtuple("Batch", "obs latent reward terminated truncated next_obs")
 """The steps of a rollout, a column each, as the growing program keeps them."""
@@ -40,6 +40,8 @@ PPO = PPOConfig(
 TRPO = TRPOConfig(horizon=STEPS, minibatch_size=16, num_epochs=3, learning_rate=1e-2, entropy_coef=0.0)
 FAR = dataclasses.replace(TRPO, max_kl=0.3)
 """So far that the quadratic model fails, and the line search has to shorten the step."""
+EDGE = dataclasses.replace(TRPO, max_kl=1.5)
+"""So far that the divergence's two directions differ: one of them allows the full step."""
 QUIET = dataclasses.replace(TRPO, adam_eps=1e-2)
 """An Adam that does not forget how long a gradient is, for a `Small` of so small a unit that nothing is clipped."""
 
@@ -79,21 +81,22 @@ class SmallPolicy:
     def __init__(self, net: nn.Sequential) -> None:
         self.net = net
 
-    def _law(self, outputs: Tensor) -> Normal:
+    def law(self, outputs: Tensor) -> Normal:
+        """Return the law of each latent `[B, A]`, of outputs `[B, 2A]`."""
         loc, log_scale = outputs.chunk(2, -1)
         return Normal(loc, log_scale.clamp(-10, 1).exp())
 
     def log_prob(self, obs: Tensor, latent: Tensor) -> Tensor:
         """Return log-densities `[B]` of latents `[B, A]`."""
-        return self._law(self.net(obs)).log_prob(latent).sum(-1)
+        return self.law(self.net(obs)).log_prob(latent).sum(-1)
 
     def entropy(self, obs: Tensor) -> Tensor:
         """Return entropies `[B]`, in nats."""
-        return self._law(self.net(obs)).entropy().sum(-1)
+        return self.law(self.net(obs)).entropy().sum(-1)
 
     def kl(self, old_outputs: Tensor, obs: Tensor) -> Tensor:
         """Return KL(old‖new) `[B]` for old outputs `[B, 2A]`, in nats."""
-        return kl_divergence(self._law(old_outputs), self._law(self.net(obs))).sum(-1)
+        return kl_divergence(self.law(old_outputs), self.law(self.net(obs))).sum(-1)
 
 
 class _Orders:
@@ -192,7 +195,8 @@ class Small:
         """Return the weights `[P]` after PPO's update with one mistake; the networks are moved.
 
         Args:
-            flaw: a value of `inbounds.book.exercises.ppo.MISTAKES`; "" is none.
+            flaw: a value of `inbounds.book.exercises.ppo.MISTAKES`; "" is none, and so is "on and on", which shuffles
+                in each pass the rows as the last pass left them.
         """
         advantage, to_go = self._advantages()
         clip_range = 0.2 if flaw in ("clip range", "no coefficients") else PPO.clip_range
@@ -210,7 +214,7 @@ class Small:
             if flaw == "each pass":
                 advantage, to_go = self._advantages()
             if number and flaw not in ("one order", "unshuffled"):
-                order = torch.randperm(STEPS)
+                order = order[torch.randperm(STEPS)] if flaw == "on and on" else torch.randperm(STEPS)
             for piece in order.split(16):
                 if flaw == "each step":
                     advantage, to_go = self._advantages()

@@ -197,8 +197,8 @@ def _refusal(function: Step) -> str:
     step = round_problem(bend=1e9, steep=1e30).moved(function)
     if step.any():
         return (
-            "no length was acceptable, yet the weights moved: put the old ones back (a copy of them; list(weights) is "
-            "none)"
+            "none of the first ten lengths was acceptable, yet the weights moved: try ten, then put the old ones back "
+            "(a copy of them; list(weights) is none)"
         )
     return ""
 

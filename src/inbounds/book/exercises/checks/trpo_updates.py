@@ -1,8 +1,9 @@
 """What is wrong with a reader's ``update`` of TRPO: where it takes the weights, beside `inbounds.learning.trpo.update`.
 
-Three updates tell more than one. In the first the full step is taken. In the second it is too long, so that the line
+Four updates tell more than one. In the first the full step is taken. In the second it is too long, so that the line
 search has to shorten it. In the third no gradient of the critic's is clipped, and Adam does not forget its length: half
-the squared error leads to the same weights in the first two, and to others there.
+the squared error leads to the same weights in the first two, and to others there. In the fourth the step is so long
+that KL(old‖new) allows it and KL(new‖old) does not.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from inbounds.book.exercises.checks.small_updates import FAR, QUIET, SEED, TRPO, Small
+from inbounds.book.exercises.checks.small_updates import EDGE, FAR, QUIET, SEED, TRPO, Small
 from inbounds.learning import TRPOConfig
 
 __all__ = ["MISTAKES", "complaint"]
@@ -32,16 +33,16 @@ def complaint(function: Callable[..., Any]) -> str | None:
         >>> complaint(lambda *arguments, **options: None) is None
         True
     """
-    small, far, quiet = Small(), Small(log_scale=NARROW), Small(unit=0.01)
+    small, far, quiet, edge = Small(), Small(log_scale=NARROW), Small(unit=0.01), Small()
     before = small.weights()
-    for scene, config in ((small, TRPO), (far, FAR), (quiet, QUIET)):
+    for scene, config in ((small, TRPO), (far, FAR), (quiet, QUIET), (edge, EDGE)):
         torch.manual_seed(SEED)
         networks, adam = (scene.policy, scene.critic), scene.adam(config)
         function(*networks, adam, scene.batch, max_kl=config.max_kl, passes=3, size=16)
     if torch.equal(before, small.weights()):
         return None
     critic = _of_a_critic(small, TRPO, before) or _of_a_critic(quiet, QUIET, Small(unit=0.01).weights())
-    return _of_a_policy(small, before) or _of_a_search(far) or critic
+    return _of_a_policy(small, before) or _of_a_search(far) or _of_a_direction(edge) or critic
 
 
 def _same(a: Tensor, b: Tensor) -> bool:
@@ -73,6 +74,17 @@ def _of_a_search(far: Small) -> str:
     return (
         f"with max_kl = {FAR.max_kl} the full step is too long, and yours spends {spent:.1f} max_kl. Does line_search "
         "take the step, with max_kl? does mean_kl() compare the *old* outputs with the policy as it is then?"
+    )
+
+
+def _of_a_direction(edge: Small) -> str:
+    """What is wrong where only KL(old‖new) allows the full step."""
+    actor = slice(0, edge.actor_size)
+    if _same(edge.weights()[actor], edge.after_the_packages(EDGE)[actor]):
+        return ""
+    return (
+        f"with max_kl = {EDGE.max_kl} its step is another one: mean_kl() is KL(old‖new), "
+        "policy.kl(old_outputs, batch.obs).mean()"
     )
 
 
