@@ -1,5 +1,6 @@
 """A quiet start: the untrained policy executes the standard deviation asked for, in every library."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,44 @@ def test_what_has_been_learned_is_not_overwritten(policy) -> None:
     heir.set_parameters(model.get_parameters())
     with pytest.raises(ValueError, match="quiet_start is for an untrained policy"):
         quiet_start(heir)
+
+
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+def test_nor_is_what_another_model_has_learned(policy) -> None:
+    """Its weights alone, without their optimiser."""
+    model = PPO(policy, Tank(), n_steps=32, batch_size=32, device="cpu", seed=1).learn(32)
+    heir = PPO(policy, Tank(), n_steps=32, batch_size=32, device="cpu", seed=1)
+    heir.set_parameters({"policy": model.policy.state_dict()}, exact_match=False)
+    with pytest.raises(ValueError, match="quiet_start is for an untrained policy"):
+        quiet_start(heir)
+
+
+def test_a_spread_set_by_hand_does_not_hide_the_boxs_size() -> None:
+    env = TransformAction(Tank(), lambda a: a, spaces.Box(-0.001, 0.001, (2,)))
+    model = PPO("MlpPolicy", env, n_steps=32, batch_size=32, device="cpu", seed=1)
+    with torch.no_grad():
+        model.policy.log_std.fill_(-1.0)
+    quiet_start(model)
+    obs = np.random.default_rng(0).normal(size=(40_000, 2)).astype(np.float32)
+    actions, _ = model.predict(obs, deterministic=False)
+    assert (actions / 0.001).std(0) == pytest.approx([0.4, 0.4], abs=0.01)
+
+
+def test_a_first_spread_that_is_the_quiet_one_does_not_scale_twice() -> None:
+    env = TransformAction(Tank(), lambda a: a, spaces.Box(-100, 100, (2,)))
+    first = {"log_std_init": math.log(100 * quiet_scale(ClippedNormal, 0.4))}
+    model = PPO("MlpPolicy", env, n_steps=128, device="cpu", seed=1, policy_kwargs=first)
+    before = quiet_start(model).policy.action_net.weight.clone()
+    assert torch.equal(before, quiet_start(model).policy.action_net.weight)
+
+
+@pytest.mark.parametrize("std", [[0.4, 0.2], None, np.array([0.4, 0.2]), torch.tensor([0.4, 0.2])])
+def test_a_spread_is_one_number(std) -> None:
+    with pytest.raises(ValueError, match="std is one number, for all components"):
+        quiet_start(PPO(LogitNormalPolicy, Tank(), n_steps=64, device="cpu"), std)
+    for law in (LogitNormal, ScaledBeta):
+        with pytest.raises(ValueError, match="std is one number, for all components"):
+            quiet_actor(nn.Identity(), 2, law, LOW, HIGH, std)
 
 
 @pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])

@@ -182,6 +182,16 @@ def test_an_action_has_its_latent() -> None:
 def test_its_noise_is_its_own() -> None:
     with pytest.raises(ValueError, match="leave use_sde=False"):
         PPO(LogitNormalPolicy, Tank(), use_sde=True, device="cpu")
+    with pytest.raises(ValueError, match="squash_output=False"):
+        PPO(LogitNormalPolicy, Tank(), policy_kwargs={"squash_output": True}, device="cpu")
+
+
+@pytest.mark.parametrize("log_scale", [-200.0, 100.0])
+def test_a_spread_beyond_the_numbers_is_named(log_scale: float) -> None:
+    options = {"log_std_init": log_scale}
+    model = PPO(LogitNormalPolicy, Tank(), n_steps=64, device="cpu", policy_kwargs=options)
+    with pytest.raises(ValueError, match="no positive, finite σ: set log_std_init closer to 0"):
+        model.policy(torch.zeros(1, 2))
 
 
 @pytest.mark.parametrize("peer", [SAC, TD3, RecurrentPPO])

@@ -29,7 +29,7 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
         The latent's σ; a Gaussian's in units of half the action range.
 
     Raises:
-        ValueError: another law, or a std that no σ of it gives.
+        ValueError: another law, or a std that is not one number or that no σ of it gives.
 
     Example:
         >>> from inbounds.distributions import ClippedNormal, LogitNormal
@@ -38,6 +38,8 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
     """
     if law not in (ClippedNormal, LogitNormal):
         raise ValueError(f"quiet_scale knows the laws ClippedNormal and LogitNormal, not {law}")
+
+    std = one_number(std)
 
     def executed(log_scale: float) -> float:
         loc, scale = torch.tensor([0.0, math.exp(log_scale)], dtype=torch.float64)
@@ -50,3 +52,21 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
             f"{most:.2g} of half the action range"
         )
     return math.exp(brentq(lambda s: executed(s) - std, *_LOG_SCALES, xtol=1e-12))
+
+
+def one_number(std: float) -> float:
+    """Return a standard deviation as Python's number.
+
+    Raises:
+        ValueError: it is None, or several.
+
+    Example:
+        >>> one_number([0.4, 0.2])
+        Traceback (most recent call last):
+        ...
+        ValueError: std is one number, for all components of the action, and not [0.4, 0.2]
+    """
+    try:
+        return float(std)
+    except (TypeError, ValueError, RuntimeError):
+        raise ValueError(f"std is one number, for all components of the action, and not {std!r}") from None

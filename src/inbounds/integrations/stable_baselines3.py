@@ -72,15 +72,20 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them.
 
         Raises:
-            ValueError: they are not finite.
+            ValueError: they are not finite, or σ is not.
         """
         if not bool(torch.isfinite(mean_actions).all() and torch.isfinite(log_std).all()):
             raise ValueError(
                 "the policy network gives NaN or ∞: look for an observation or a reward that is not finite, "
                 "or take a smaller learning rate"
             )
+        scale = log_std.exp()
+        if not bool((torch.isfinite(scale) & (scale > 0)).all()):
+            raise ValueError(
+                f"log σ = {log_std.tolist()} has no positive, finite σ: set log_std_init closer to 0"
+            )
         low, high = (bound.to(mean_actions) for bound in (self.low, self.high))
-        self.distribution = LogitNormal(mean_actions, log_std.exp(), low, high, validate_args=False)
+        self.distribution = LogitNormal(mean_actions, scale, low, high, validate_args=False)
         return self
 
     def log_prob(self, actions: Tensor) -> Tensor:
@@ -140,8 +145,11 @@ class LogitNormalPolicy(ActorCriticPolicy):
         **options: Any,
     ) -> None:
         require_box(action_space)
-        if options.get("use_sde"):
-            raise ValueError("LogitNormalPolicy draws its own noise: leave use_sde=False")
+        if options.get("use_sde") or options.get("squash_output"):
+            raise ValueError(
+                "LogitNormalPolicy draws its own noise and maps it into the box: leave use_sde=False and "
+                "squash_output=False"
+            )
         if isinstance(observation_space, gymnasium.spaces.Dict):  # as the peer's `MultiInputPolicy`
             options.setdefault("features_extractor_class", CombinedExtractor)
         elif is_image_space(  # as the peer's `CnnPolicy`
@@ -281,9 +289,10 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
         raise ValueError(
             f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
         )
-    if (
-        model.num_timesteps or policy.optimizer.state
-    ):  # the parameters of a trained model bring their optimiser's
+    moved = (
+        policy.ortho_init and policy.value_net.bias.any()
+    )  # which starts at 0: these are another model's weights
+    if model.num_timesteps or policy.optimizer.state or moved:  # a trained model's optimiser has a state
         raise ValueError(
             f"quiet_start is for an untrained policy, and this one has learned ({model.num_timesteps} steps here): "
             "call it before `learn`, on a new model"
@@ -295,10 +304,12 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
             policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))
             policy.action_net.bias.zero_()
         else:
-            half, weight = (high - low) / 2, policy.action_net.weight
-            # A second call, perhaps after loading, sets another std alone.
-            if (policy.log_std == policy.log_std_init).all():
+            half, weight, scale = (high - low) / 2, policy.action_net.weight, quiet_scale(ClippedNormal, std)
+            if not getattr(
+                model, "started_quietly", False
+            ):  # a second call, perhaps after loading, sets the std alone
+                model.started_quietly = True
                 weight.mul_(half[:, None].to(weight))
-            policy.log_std.copy_((half * quiet_scale(ClippedNormal, std)).log())
+            policy.log_std.copy_((half * scale).log())
             policy.action_net.bias.copy_((high + low) / 2)
     return model

@@ -35,7 +35,7 @@ from torch.distributions import Distribution, constraints, kl_divergence, regist
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.distributions.bounds import TensorLike, require_bounds
-from inbounds.integrations.quiet import quiet_scale
+from inbounds.integrations.quiet import one_number, quiet_scale
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
@@ -298,6 +298,7 @@ def quiet_actor(
     """
     if law not in PARAMETERS:
         raise ValueError(f"quiet_actor knows the laws LogitNormal and ScaledBeta, not {law}")
+    std = one_number(std)
     if law is ScaledBeta:
         if not 0 < std < 3**-0.5:
             raise ValueError(
