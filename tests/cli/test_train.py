@@ -563,7 +563,14 @@ def test_a_full_disk_stops_tensorboard_and_not_what_there_is_to_say(
 
 
 @pytest.mark.parametrize(
-    "make", [lambda: torch.empty(2**60), lambda: np.empty(2**59)], ids=["torch", "numpy"]
+    "make",
+    [
+        lambda: torch.empty(2**60),
+        lambda: np.empty(2**59),
+        lambda: np.empty((2**40, 2**40)),
+        lambda: np.random.default_rng(0).standard_normal((10**20, 1)),
+    ],
+    ids=["torch", "numpy", "numpy, beyond its index", "numpy, beyond 64 bits"],
 )
 def test_without_memory_for_it_a_run_ends_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: Any

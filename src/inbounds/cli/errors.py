@@ -46,14 +46,17 @@ NO_MEMORY = (
 )
 
 
+_TOO_LARGE = "can't allocate memory", "Maximum allowed dimension exceeded", "array is too big"
+
+
 def lacks_memory(error: BaseException) -> bool:
-    """Return whether an error means that there is no memory; torch makes a RuntimeError of it.
+    """Return whether an error means that there is no memory; torch makes a RuntimeError of it, NumPy a ValueError.
 
     Example:
         >>> lacks_memory(MemoryError()), lacks_memory(RuntimeError("shapes differ"))
         (True, False)
     """
-    return isinstance(error, MemoryError) or "can't allocate memory" in str(error)
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _TOO_LARGE)
 
 
 def is_ours(error: BaseException) -> bool:

@@ -159,6 +159,8 @@ class _Session:
             except KeyboardInterrupt:
                 raise CommandError(self._kept("stopped in mid-epoch"), 130) from None
             except ValueError as error:
+                if lacks_memory(error):
+                    raise self._out_of_memory() from error
                 if self.done > start or not is_ours(error):
                     raise  # no fault of the command's: nothing was wrong with the first epoch
                 raise CommandError(str(error), 2) from error
@@ -170,10 +172,13 @@ class _Session:
                 raise self._unwritten(error) from error
             except (Exception, SystemExit) as error:  # the environment's own, too
                 if lacks_memory(error):
-                    raise CommandError(f"{NO_MEMORY}. {self._kept('Training stopped')}") from error
+                    raise self._out_of_memory() from error
                 progress.say(self._kept("stopped by an error"))
                 raise
         return self._conclude(trainer, start)
+
+    def _out_of_memory(self) -> CommandError:
+        return CommandError(f"{NO_MEMORY}. {self._kept('Training stopped')}")
 
     def _after_epoch(self, trainer: Trainer, record: Record, watchers: list[Any]) -> None:
         self.done = len(trainer.records)
