@@ -61,6 +61,12 @@ def test_epochs_without_an_episode_do_not_count_as_bad_ones() -> None:
     assert area([[nan, 2.0, nan, nan, 6.0], [1.0, 1.0, 1.0, 1.0, 1.0]]).tolist() == [14 / 5, 1.0]
 
 
+def test_points_of_a_curve_are_means_of_ten_epochs() -> None:
+    values = np.arange(50.0).reshape(2, 25)
+    values[0, 3] = np.nan  # an epoch in which no episode ended
+    np.testing.assert_allclose(validate.in_groups(values, 10), [[42 / 9, 14.5], [29.5, 39.5]])
+
+
 def test_the_stored_areas_come_out_of_the_stored_curves() -> None:
     folder = RESULTS / "validation"
     stored = json.loads((folder / "validation.json").read_text(encoding="utf8"))

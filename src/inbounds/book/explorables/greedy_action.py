@@ -181,8 +181,10 @@ def _static_figure(policy: GreedyActions) -> Figure:
         for ax, at in zip(axes[1:], (policy.mu, policy.sigma), strict=True):
             ax.axvline(at, color="#5F6770", linewidth=1, linestyle=":")
         axes[0].set(xlabel="action", title="density", ylim=(0, None))
-        axes[1].set(xlabel="μ", title=f"σ = {policy.sigma:.3g}", ylim=(-1.05, 1.05))
-        axes[2].set(xlabel="σ", title=f"μ = {policy.mu:.3g}", ylim=(-1.05, 1.05), xscale="log")
+        axes[1].set(xlabel="μ", ylabel="action", title=f"σ = {policy.sigma:.3g}", ylim=(-1.05, 1.05))
+        axes[2].set(
+            xlabel="σ", ylabel="action", title=f"μ = {policy.mu:.3g}", ylim=(-1.05, 1.05), xscale="log"
+        )
         fig.legend(loc="outside lower center", ncols=3)
     return fig
 

@@ -67,8 +67,8 @@ SPEED_ALT = (
     "median as a marker, range over the repeats as a line, the floor as a dashed vertical line."
 )
 VALIDATION_ALT = (
-    "Return in training against env steps, a panel per robot: mean and 95 percent interval over seeds of this engine, "
-    "a solid line, and of stable-baselines3, a dashed line."
+    "Return in training, averaged over ten epochs, against env steps, a panel per robot: mean and 95 percent interval "
+    "over seeds of this engine, a solid line, and of stable-baselines3, a dashed line."
 )
 ANCHOR_ALT = f"Over a million steps: {VALIDATION_ALT[0].lower()}{VALIDATION_ALT[1:]}"
 
