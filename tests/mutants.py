@@ -50,14 +50,14 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant(
         "a quiet start forgets the box's units",
         "integrations/stable_baselines3.py",
-        "policy.log_std.copy_((half * quiet_scale(ClippedNormal, std)).log())",
-        "policy.log_std.fill_(math.log(quiet_scale(ClippedNormal, std)))",
+        "policy.log_std.copy_((half * scale).log())",
+        "policy.log_std.fill_(math.log(scale))",
         "tests/integrations/test_quiet.py::test_models_of_the_peer_start_so_in_a_lopsided_box",
     ),
     Mutant(
         "every quiet start scales the weights",
         "integrations/stable_baselines3.py",
-        "if (policy.log_std == policy.log_std_init).all():",
+        'if not getattr(model, "started_quietly", False):',
         "if True:",
         "tests/integrations/test_quiet.py::test_a_second_call_sets_another_noise_and_nothing_else",
     ),
@@ -662,6 +662,20 @@ MUTANTS: tuple[Mutant, ...] = (
         "return self.distribution.log_prob_latent(actions).sum(-1)",
         "return self.distribution.log_prob(self.action(actions)).sum(-1)",
         "tests/integrations/test_stable_baselines3.py::test_a_saturated_action_keeps_its_score",
+    ),
+    Mutant(
+        "stable-baselines3's Beta may have modes on its bounds",
+        "integrations/stable_baselines3_beta.py",
+        "(1 + softplus(action_logits))",
+        "softplus(action_logits)",
+        "tests/integrations/test_stable_baselines3_beta.py::test_a_latent_is_scored_as_its_action",
+    ),
+    Mutant(
+        "stable-baselines3's Beta acts by its mean",
+        "integrations/stable_baselines3_beta.py",
+        "self.distribution.value_to_latent(self.distribution.median)",
+        "self.distribution.value_to_latent(self.distribution.mean)",
+        "tests/integrations/test_stable_baselines3_beta.py::test_deterministic_is_the_median_and_survives_the_disk",
     ),
     Mutant(
         "stable-baselines3 sends latents to the robot",

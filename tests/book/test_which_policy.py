@@ -29,12 +29,12 @@ assert action.shape == (2,) and len(run.policies) == 10
     "stable-baselines3": """
 import torch
 obs = torch.zeros(3000, 17)
-for policy in ("MlpPolicy", LogitNormalPolicy):
+for policy in LAWS:
     fresh = quiet_start(PPO(policy, ROBOT, device="cpu")).policy
     with torch.no_grad():
         drawn = fresh(obs)[0].numpy()
-    executed(fresh.unscale_action(drawn) if policy is LogitNormalPolicy else drawn)
-assert min(gaussian.num_timesteps, logit_normal.num_timesteps) >= STEPS
+    executed(drawn if policy == "MlpPolicy" else fresh.unscale_action(drawn))
+assert len(models) == 3 and min(model.num_timesteps for model in models) >= STEPS
 """,
     "TorchRL": """
 executed(batch["action"].detach().numpy())

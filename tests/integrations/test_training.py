@@ -19,6 +19,7 @@ with warnings.catch_warnings():  # the library warns of its own deprecations whi
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.integrations.stable_baselines3 import LogitNormalPolicy, quiet_start
+from inbounds.integrations.stable_baselines3_beta import BetaPolicy
 from inbounds.integrations.torchrl import quiet_actor
 from tests.integrations.tank import HIGH, HORIZON, LOW, Tank
 
@@ -44,7 +45,7 @@ def assert_improved(before: np.ndarray, after: np.ndarray) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy, BetaPolicy])
 def test_stable_baselines3_learns_from_a_quiet_start(policy) -> None:
     settings = {"n_steps": 512, "gamma": 0.9, "learning_rate": 1e-3, "device": "cpu", "seed": 0}
     model = quiet_start(PPO(policy, Tank(), **settings), 0.4)

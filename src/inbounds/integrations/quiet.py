@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from inbounds.distributions import ClippedNormal, LogitNormal
 
-__all__ = ["quiet_scale"]
+__all__ = ["quiet_concentration", "quiet_scale"]
 
 _LOG_SCALES = -10.0, 3.0
 
@@ -52,6 +52,37 @@ def quiet_scale(law: type[ClippedNormal | LogitNormal], std: float = 0.4) -> flo
             f"{most:.2g} of half the action range"
         )
     return math.exp(brentq(lambda s: executed(s) - std, *_LOG_SCALES, xtol=1e-12))
+
+
+def quiet_concentration(std: float = 0.4) -> float:
+    """Return the α = β above 1 with which a Beta executes a standard deviation of std, 1/√(2α + 1) of half the range.
+
+    Args:
+        std: of the executed action, in units of half the action range.
+
+    Raises:
+        ValueError: not one number, or out of reach: between 0 and 0.577, which is the uniform law's.
+
+    Example:
+        >>> round(quiet_concentration(0.4), 3)
+        2.625
+    """
+    std = one_number(std)
+    if not 0 < std < 3**-0.5:
+        raise ValueError(
+            f"std={std} is out of reach: a Beta without modes on its bounds executes less than 0.577"
+        )
+    return (std**-2 - 1) / 2
+
+
+def inverse_softplus(value: float) -> float:
+    """Return the x of log(1 + eˣ) = value, for a positive value, without overflow.
+
+    Example:
+        >>> round(inverse_softplus(math.log(2)), 12)
+        0.0
+    """
+    return value + math.log(-math.expm1(-value))
 
 
 def one_number(std: float) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -74,11 +74,7 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         Raises:
             ValueError: they are not finite, or σ is not.
         """
-        if not bool(torch.isfinite(mean_actions).all() and torch.isfinite(log_std).all()):
-            raise ValueError(
-                "the policy network gives NaN or ∞: look for an observation or a reward that is not finite, "
-                "or take a smaller learning rate"
-            )
+        require_finite(mean_actions, log_std)
         scale = log_std.exp()
         if not bool((torch.isfinite(scale) & (scale > 0)).all()):
             raise ValueError(
@@ -108,8 +104,94 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         """Return the actions `[B, A]` that latents stand for, strictly inside the box."""
         return self.distribution.latent_to_value(latent)
 
+    @staticmethod
+    def start_quietly(policy: Any, std: float) -> None:
+        """Set σ and the head's bias; see `quiet_start`."""
+        policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))
+        policy.action_net.bias.zero_()
 
-class LogitNormalPolicy(ActorCriticPolicy):
+
+def require_finite(*outputs: Tensor) -> None:
+    """Refuse what a network gives, if it is not finite.
+
+    Raises:
+        ValueError: some number is NaN or infinite.
+
+    Example:
+        >>> require_finite(torch.zeros(2))
+    """
+    if not all(bool(torch.isfinite(each).all()) for each in outputs):
+        raise ValueError(
+            "the policy network gives NaN or ∞: look for an observation or a reward that is not finite, "
+            "or take a smaller learning rate"
+        )
+
+
+class BoundedPolicy(ActorCriticPolicy):
+    """What the policies share whose latents the peer keeps: networks, the way into the box, and what is refused."""
+
+    law: ClassVar[type[Any]]
+    """Makes a law, in the peer's interface, of two bounds `[A]`."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.spaces.Space[Any],
+        action_space: gymnasium.spaces.Space[Any],
+        lr_schedule: Callable[[float], float],
+        **options: Any,
+    ) -> None:
+        require_box(action_space)
+        if options.get("use_sde") or options.get("squash_output"):
+            raise ValueError(
+                f"{type(self).__name__} draws its own noise and maps it into the box: leave use_sde=False and "
+                "squash_output=False"
+            )
+        if isinstance(observation_space, gymnasium.spaces.Dict):  # as the peer's `MultiInputPolicy`
+            options.setdefault("features_extractor_class", CombinedExtractor)
+        elif is_image_space(  # as the peer's `CnnPolicy`
+            observation_space, normalized_image=not options.get("normalize_images", True)
+        ):
+            options.setdefault("features_extractor_class", NatureCNN)
+        super().__init__(observation_space, action_space, lr_schedule, **options)
+        self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
+
+    def _build(self, lr_schedule: Callable[[float], float]) -> None:
+        """Put our law in the place of the peer's choice before it builds the heads."""
+        self.action_dist = self.law(*self._bounds)
+        super()._build(lr_schedule)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("actor", "lstm_actor"):  # the algorithm is off policy, or recurrent
+            raise AttributeError(
+                f"{type(self).__name__} is for A2C, PPO and TRPO. SAC has a squashed Gaussian of its own, TD3 and DDPG "
+                'an actor without a law ("MlpPolicy" there), and RecurrentPPO a memory that this policy has not'
+            )
+        return super().__getattr__(name)
+
+    def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
+        """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
+        latent = _floating(scaled_action)
+        low, high = self._bounds  # of a narrower type than the latent's, they could be reached by rounding
+        value = from_line(latent, *self._limits(latent)).numpy().astype(low.dtype)
+        return np.clip(value, np.nextafter(low, high), np.nextafter(high, low))
+
+    def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
+        """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
+        value = _floating(action)
+        return to_line(value, *self._limits(value)).numpy()
+
+    def _limits(self, like: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the bounds `[A]` as tensors of the type and on the device of another."""
+        low, high = (torch.as_tensor(np.array(bound)).to(like) for bound in self._bounds)
+        return low, high
+
+    @property
+    def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        box: Any = self.action_space
+        return box.low, box.high
+
+
+class LogitNormalPolicy(BoundedPolicy):
     """The peer's actor-critic with logit-normal actions in any bounded box; see the module.
 
     Args:
@@ -137,62 +219,7 @@ class LogitNormalPolicy(ActorCriticPolicy):
         True
     """
 
-    def __init__(
-        self,
-        observation_space: gymnasium.spaces.Space[Any],
-        action_space: gymnasium.spaces.Space[Any],
-        lr_schedule: Callable[[float], float],
-        **options: Any,
-    ) -> None:
-        require_box(action_space)
-        if options.get("use_sde") or options.get("squash_output"):
-            raise ValueError(
-                "LogitNormalPolicy draws its own noise and maps it into the box: leave use_sde=False and "
-                "squash_output=False"
-            )
-        if isinstance(observation_space, gymnasium.spaces.Dict):  # as the peer's `MultiInputPolicy`
-            options.setdefault("features_extractor_class", CombinedExtractor)
-        elif is_image_space(  # as the peer's `CnnPolicy`
-            observation_space, normalized_image=not options.get("normalize_images", True)
-        ):
-            options.setdefault("features_extractor_class", NatureCNN)
-        super().__init__(observation_space, action_space, lr_schedule, **options)
-        self._squash_output = True  # the peer then calls `unscale_action`, and clips nothing
-
-    def _build(self, lr_schedule: Callable[[float], float]) -> None:
-        """Put our law in the place of the peer's choice before it builds the heads."""
-        self.action_dist = LogitNormalDistribution(*self._bounds)
-        super()._build(lr_schedule)
-
-    def __getattr__(self, name: str) -> Any:
-        if name in ("actor", "lstm_actor"):  # the algorithm is off policy, or recurrent
-            raise AttributeError(
-                "LogitNormalPolicy is for A2C, PPO and TRPO. SAC has a squashed Gaussian of its own, TD3 and DDPG an "
-                'actor without a law ("MlpPolicy" there), and RecurrentPPO a memory that this policy has not'
-            )
-        return super().__getattr__(name)
-
-    def unscale_action(self, scaled_action: NDArray[Any]) -> NDArray[Any]:
-        """Return the actions that latents stand for, `[..., A]`, on the way into the environment."""
-        latent = _floating(scaled_action)
-        low, high = self._bounds  # of a narrower type than the latent's, they could be reached by rounding
-        value = from_line(latent, *self._limits(latent)).numpy().astype(low.dtype)
-        return np.clip(value, np.nextafter(low, high), np.nextafter(high, low))
-
-    def scale_action(self, action: NDArray[Any]) -> NDArray[Any]:
-        """Return the latents `[..., A]` that actions strictly inside the box stand for: `unscale_action`, backwards."""
-        value = _floating(action)
-        return to_line(value, *self._limits(value)).numpy()
-
-    def _limits(self, like: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the bounds `[A]` as tensors of the type and on the device of another."""
-        low, high = (torch.as_tensor(np.array(bound)).to(like) for bound in self._bounds)
-        return low, high
-
-    @property
-    def _bounds(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        box: Any = self.action_space
-        return box.low, box.high
+    law = LogitNormalDistribution
 
 
 class LogitNormalActor(nn.Module):
@@ -262,11 +289,11 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
 
     The peer starts with log σ = 0 and a spread of μ of about 0.01, both in the box's units for its own Gaussian,
     whatever the box. Here the free log σ is set, and the bias of the head of μ; the weights of the Gaussian's head
-    are scaled by half the range. All are learned from there. Without the peer's `ortho_init` μ spreads more, and so do
-    the actions.
+    are scaled by half the range. Of a Beta the bias of the head sets both concentrations. All are learned from there.
+    Without the peer's `ortho_init` the outputs spread more, and so do the actions.
 
     Args:
-        model: PPO, A2C or TRPO with the peer's own Gaussian or with `LogitNormalPolicy`, on a bounded box.
+        model: PPO, A2C or TRPO with the peer's own Gaussian, `LogitNormalPolicy` or `BetaPolicy`, on a bounded box.
         std: of the executed action, clipped or squashed, in units of half the action range.
 
     Returns:
@@ -284,14 +311,14 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
     policy: Any = getattr(model, "policy", None)
     if policy is None:
         raise ValueError(f"quiet_start takes a model that is set up, quiet_start(PPO(…)), and not {model!r}")
-    kind = type(getattr(policy, "action_dist", policy))
-    if kind not in (DiagGaussianDistribution, LogitNormalDistribution):
+    law = getattr(policy, "action_dist", policy)
+    ours = isinstance(policy, BoundedPolicy)
+    if not ours and type(law) is not DiagGaussianDistribution:
         raise ValueError(
-            f"quiet_start sets the σ of a Gaussian or a logit-normal, and this policy has {kind.__name__}"
+            "quiet_start sets the σ of a Gaussian or a logit-normal or a Beta's concentrations, and this policy has "
+            f"{type(law).__name__}"
         )
-    moved = (
-        policy.ortho_init and policy.value_net.bias.any()
-    )  # which starts at 0: these are another model's weights
+    moved = policy.ortho_init and policy.value_net.bias.any()  # which starts at 0: another model's weights
     if model.num_timesteps or policy.optimizer.state or moved:  # a trained model's optimiser has a state
         raise ValueError(
             f"quiet_start is for an untrained policy, and this one has learned ({model.num_timesteps} steps here): "
@@ -300,14 +327,12 @@ def quiet_start(model: Any, std: float = 0.4) -> Any:
     box: Any = model.action_space
     low, high = require_bounds(box.low.reshape(-1), box.high.reshape(-1))
     with torch.no_grad():
-        if kind is LogitNormalDistribution:
-            policy.log_std.fill_(math.log(quiet_scale(LogitNormal, std)))
-            policy.action_net.bias.zero_()
+        if ours:
+            law.start_quietly(policy, std)
         else:
             half, weight, scale = (high - low) / 2, policy.action_net.weight, quiet_scale(ClippedNormal, std)
-            if not getattr(
-                model, "started_quietly", False
-            ):  # a second call, perhaps after loading, sets the std alone
+            # A second call, perhaps after loading, sets the std alone.
+            if not getattr(model, "started_quietly", False):
                 model.started_quietly = True
                 weight.mul_(half[:, None].to(weight))
             policy.log_std.copy_((half * scale).log())

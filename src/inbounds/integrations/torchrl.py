@@ -35,7 +35,7 @@ from torch.distributions import Distribution, constraints, kl_divergence, regist
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.distributions.bounds import TensorLike, require_bounds
-from inbounds.integrations.quiet import one_number, quiet_scale
+from inbounds.integrations.quiet import inverse_softplus, one_number, quiet_concentration, quiet_scale
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
@@ -238,7 +238,7 @@ class _BetaHead(nn.Module):
     def __init__(self, start: float) -> None:
         super().__init__()
         excess = max(start - 1, math.ulp(1.0))
-        self.shift = excess + math.log(-math.expm1(-excess))  # the softplus' inverse, without overflow
+        self.shift = inverse_softplus(excess)
 
     def forward(self, outputs: Tensor) -> tuple[Tensor, ...]:
         return tuple((1 + nn.functional.softplus(outputs + self.shift)).chunk(2, dim=-1))
@@ -300,13 +300,7 @@ def quiet_actor(
         raise ValueError(f"quiet_actor knows the laws LogitNormal and ScaledBeta, not {law}")
     std = one_number(std)
     if law is ScaledBeta:
-        if not 0 < std < 3**-0.5:
-            raise ValueError(
-                f"std={std} is out of reach: a Beta without modes on its bounds executes less than 0.577"
-            )
-        head: nn.Module = _BetaHead(
-            (std**-2 - 1) / 2
-        )  # the standard deviation is 1/√(2α + 1) of half the range
+        head: nn.Module = _BetaHead(quiet_concentration(std))
     else:
         scale = quiet_scale(LogitNormal, std)
         if scale < LEAST_SCALE:
