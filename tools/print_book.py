@@ -26,15 +26,27 @@ LEFT_RIGHT, TOP, BOTTOM = "18mm", "16mm", "18mm"
 PAPER = {"width": int(174 / 25.4 * 96), "height": 1000}  # px: A4 without the margins
 FOOTER = """<div style="width:100%;font:8pt sans-serif;color:#555;text-align:center">
 <span class="pageNumber"></span></div>"""
-# What is wider than the paper is made smaller until it fits. A wide formula would be cut.
+# What is wider than the paper, or a picture that is longer, is made smaller until it fits; long code goes on overleaf.
 FIT = """() => {
+  for (const it of document.querySelectorAll('figure img, .cell_output img')) {
+    const {width, height} = it.getBoundingClientRect();
+    if (height > LONGEST) it.style.setProperty('width', `${width * LONGEST / height}px`, 'important');
+  }
+  for (const it of document.querySelectorAll('.highlight, .admonition, details')) {
+    if (it.getBoundingClientRect().height < 450) continue;
+    for (let each = it; each.tagName !== 'MAIN'; each = each.parentElement) {
+      each.style.setProperty('break-inside', 'auto', 'important');
+      each.style.setProperty('overflow', 'visible', 'important');
+      if (getComputedStyle(each).display === 'flex') each.style.setProperty('display', 'block', 'important');
+    }
+  }
   const page = document.querySelector('main').clientWidth;
   for (const it of document.querySelectorAll('table, mjx-container[display=true], .inbounds-static img')) {
     const room = Math.min(page, it.parentElement.closest('div, section, figure, main').clientWidth || page);
     const wide = Math.max(it.scrollWidth, it.getBoundingClientRect().width);
     if (wide > room + 1) it.style.zoom = String(Math.max(0.35, room / wide * 0.99));
   }
-}"""
+}""".replace("LONGEST", "850")  # px of the paper's 990, for there is a caption, too
 SETTLED = """async () => {
   await document.fonts.ready;
   if (window.MathJax?.startup) await MathJax.startup.promise;

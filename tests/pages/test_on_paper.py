@@ -1,4 +1,4 @@
-"""Printed: pages with numbers, an outline, tags and links that lead somewhere; nothing wider than the paper."""
+"""Printed: pages with numbers, an outline, tags and links that lead somewhere; nothing larger than the paper."""
 
 import importlib
 import sys
@@ -20,6 +20,9 @@ TOO_WIDE = """() => {
     .map((it) => `${it.tagName} ${(it.alt || it.textContent || '').trim().slice(0, 60)}`);
 }"""
 
+TOO_LONG = """() => [...document.querySelectorAll('main img')]
+  .filter((it) => it.getBoundingClientRect().height > 900).map((it) => it.alt.slice(0, 60))"""
+
 
 @pytest.fixture(scope="module")
 def tool() -> object:
@@ -40,15 +43,19 @@ def test_a_print_has_numbers_an_outline_and_tags(tool: object, tmp_path: Path, b
     assert "/StructTreeRoot" in reader.trailer["/Root"]
     titles = [each.title for each in reader.outline if not isinstance(each, list)]
     assert any("TRPO" in title for title in titles)
-    contents = reader.pages[1].extract_text()
+    texts = [page.extract_text() for page in reader.pages]
+    assert [text for text in texts[1:] if len(text.split()) < 6] == []  # a title, its block on the next page
+    contents = texts[1]
     for name, number in first.items():
         assert str(number) in contents
-        assert str(number) in reader.pages[number - 1].extract_text(), name
+        assert str(number) in texts[number - 1], name
     assert not (books.HTML / "notebooks" / "whole-book-for-print.htm").exists()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_wider_than_the_paper(tool: object, name: str, browser: Browser, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [*NAMES, "notebooks/bang_bang"])  # the last one has the longest picture
+def test_nothing_is_wider_than_the_paper_and_no_picture_longer(
+    tool: object, name: str, browser: Browser, tmp_path: Path
+) -> None:
     document = books.HTML / "notebooks" / f"print-of-{name.rpartition('/')[2]}.htm"
     document.write_text(tool.one_document.join(books.HTML, [name], {}), encoding="utf8")
     try:
@@ -58,6 +65,7 @@ def test_nothing_is_wider_than_the_paper(tool: object, name: str, browser: Brows
         page.evaluate(tool.SETTLED)
         page.evaluate(tool.FIT)
         assert page.evaluate(TOO_WIDE) == []
+        assert page.evaluate(TOO_LONG) == []
         page.close()
     finally:
         document.unlink()
