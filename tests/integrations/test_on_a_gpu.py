@@ -18,6 +18,7 @@ with warnings.catch_warnings():  # the library warns of its own deprecations whi
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.integrations.stable_baselines3 import LogitNormalPolicy, quiet_start
+from inbounds.integrations.stable_baselines3_beta import BetaPolicy
 from inbounds.integrations.torchrl import quiet_actor
 from tests.integrations.tank import HIGH, LOW, Tank
 
@@ -29,7 +30,7 @@ pytestmark = [
 OBS = np.float32([[0.3, 0.0], [-0.7, 0.5]])
 
 
-@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy])
+@pytest.mark.parametrize("policy", ["MlpPolicy", LogitNormalPolicy, BetaPolicy])
 @pytest.mark.parametrize("algorithm", [PPO, A2C, TRPO])
 def test_stable_baselines3_learns_there(algorithm, policy) -> None:
     tank = Tank()
