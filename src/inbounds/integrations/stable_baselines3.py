@@ -39,7 +39,30 @@ except ImportError as error:
 __all__ = ["LogitNormalActor", "LogitNormalDistribution", "LogitNormalPolicy", "quiet_start"]
 
 
-class LogitNormalDistribution(DiagGaussianDistribution):
+class ScoresLatents:
+    """What a law of the package does in the peer's interface, where "actions" are latents `[B, A]`."""
+
+    distribution: Any
+    """`LogitNormal` or `ScaledBeta`, batch shape `[B, A]`."""
+
+    def log_prob(self, actions: Tensor) -> Tensor:
+        """Return the log-density `[B]` of the *actions* that latents `[B, A]` stand for, in nats."""
+        return self.distribution.log_prob_latent(actions).sum(-1)
+
+    def entropy(self) -> Tensor:
+        """Return the differential entropy `[B]` of the action in its box, in nats."""
+        return self.distribution.entropy().sum(-1)
+
+    def sample(self) -> Tensor:
+        """Return reparametrised latents `[B, A]`."""
+        return self.distribution.rsample_latent()
+
+    def action(self, latent: Tensor) -> Tensor:
+        """Return the actions `[B, A]` that latents stand for, strictly inside the box."""
+        return self.distribution.latent_to_value(latent)
+
+
+class LogitNormalDistribution(ScoresLatents, DiagGaussianDistribution):
     """A box of independent logit-normals, in the peer's interface: its "actions" are latents `[B, A]`.
 
     It inherits the peer's head: a layer for loc, and one free log σ per dimension.
@@ -84,25 +107,9 @@ class LogitNormalDistribution(DiagGaussianDistribution):
         self.distribution = LogitNormal(mean_actions, scale, low, high, validate_args=False)
         return self
 
-    def log_prob(self, actions: Tensor) -> Tensor:
-        """Return the log-density `[B]` of the *actions* that latents `[B, A]` stand for, in nats."""
-        return self.distribution.log_prob_latent(actions).sum(-1)
-
-    def entropy(self) -> Tensor:
-        """Return the differential entropy `[B]` of the action in its box, in nats."""
-        return self.distribution.entropy().sum(-1)
-
-    def sample(self) -> Tensor:
-        """Return reparametrised latents `[B, A]`."""
-        return self.distribution.rsample_latent()
-
     def mode(self) -> Tensor:
         """Return the latents `[B, A]` of the medians: what the peer calls deterministic, and a bijection keeps."""
         return self.distribution.loc
-
-    def action(self, latent: Tensor) -> Tensor:
-        """Return the actions `[B, A]` that latents stand for, strictly inside the box."""
-        return self.distribution.latent_to_value(latent)
 
     @staticmethod
     def start_quietly(policy: Any, std: float) -> None:

@@ -20,7 +20,7 @@ from torch.nn.functional import softplus
 from inbounds.distributions import ScaledBeta
 from inbounds.distributions.bounds import require_bounds
 from inbounds.integrations.quiet import inverse_softplus, quiet_concentration
-from inbounds.integrations.stable_baselines3 import BoundedPolicy, require_finite
+from inbounds.integrations.stable_baselines3 import BoundedPolicy, ScoresLatents, require_finite
 
 try:
     from stable_baselines3.common.distributions import BernoulliDistribution
@@ -32,7 +32,7 @@ except ImportError as error:
 __all__ = ["BetaDistribution", "BetaPolicy"]
 
 
-class BetaDistribution(BernoulliDistribution):
+class BetaDistribution(ScoresLatents, BernoulliDistribution):
     """A box of independent Betas, in the peer's interface: its "actions" are latents `[B, A]`.
 
     The peer has a place for laws that one layer determines, which it keeps for its Bernoulli.
@@ -75,25 +75,9 @@ class BetaDistribution(BernoulliDistribution):
         self.distribution = ScaledBeta(alpha, beta, low, high, validate_args=False)
         return self
 
-    def log_prob(self, actions: Tensor) -> Tensor:
-        """Return the log-density `[B]` of the *actions* that latents `[B, A]` stand for, in nats."""
-        return self.distribution.log_prob_latent(actions).sum(-1)
-
-    def entropy(self) -> Tensor:
-        """Return the differential entropy `[B]` of the action in its box, in nats."""
-        return self.distribution.entropy().sum(-1)
-
-    def sample(self) -> Tensor:
-        """Return reparametrised latents `[B, A]`."""
-        return self.distribution.rsample_latent()
-
     def mode(self) -> Tensor:
         """Return the latents `[B, A]` of the medians, which a bijection keeps: what the peer calls deterministic."""
         return self.distribution.value_to_latent(self.distribution.median)
-
-    def action(self, latent: Tensor) -> Tensor:
-        """Return the actions `[B, A]` that latents stand for, strictly inside the box."""
-        return self.distribution.latent_to_value(latent)
 
     @staticmethod
     def start_quietly(policy: Any, std: float) -> None:
