@@ -159,3 +159,11 @@ def test_gauss_hermite_has_as_many_nodes_as_its_weights_survive() -> None:
     for count, fix in ((0, "from 1 to 370, got 0$"), (371, "got 371: take the trapezoid rule")):
         with pytest.raises(ValueError, match=fix):
             gauss_hermite(count)
+
+
+def test_types_are_promoted() -> None:
+    """A location in single precision does not make the nodes coarse."""
+    loc, scale = torch.tensor(1.0), torch.tensor(2.0, dtype=torch.float64)
+    mixed = expectation(torch.sigmoid, loc.double(), scale, graded_trapezoid(loc, scale))
+    pure = expectation(torch.sigmoid, loc.double(), scale, graded_trapezoid(loc.double(), scale))
+    assert abs(mixed - pure) < 1e-15

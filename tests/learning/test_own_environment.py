@@ -123,6 +123,7 @@ def test_what_is_of_another_type_or_size_is_named() -> None:
         PolicyConfig("beta", initial_std=0.0)
     for scale in (1e8, 1e9, 1e10, 1e20, 1e150):  # a law of two bounds
         assert executed_std("gaussian", scale) == pytest.approx(1.0, abs=1e-7)
+    assert executed_std("logit-normal", 1e8) <= 1.0
     assert executed_std("gaussian", 1e-200) == pytest.approx(0.0, abs=1e-150)
     with pytest.raises(ValueError, match="a scale must be positive"):
         executed_std("gaussian", 0.0)

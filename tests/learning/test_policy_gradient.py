@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from inbounds.distributions import expectation, trapezoid
-from inbounds.learning import FAMILIES, PolicyGradientConfig, Trainer, policy_gradient
+from inbounds.learning import FAMILIES, PolicyGradientConfig, Trainer, policy_gradient, ppo, preset, trpo
 from inbounds.learning.families import NormalParameters
 from tests.learning.point import PointEnv
 from tests.learning.small import FAMILIES as NAMES
@@ -77,3 +77,14 @@ def test_it_learns_and_takes_one_policy_step_per_epoch() -> None:
 def test_the_configuration_is_checked() -> None:
     with pytest.raises(ValueError, match="policy_learning_rate must be positive"):
         PolicyGradientConfig(policy_learning_rate=0.0)
+
+
+@pytest.mark.parametrize("algorithm", [policy_gradient, ppo, trpo])
+def test_a_rollout_that_minibatches_do_not_divide_changes_nothing(algorithm) -> None:
+    name = algorithm.__name__.rpartition(".")[2].replace("_", "-")
+    trainer = Trainer(preset("common", "Hopper-v5", algo=name, seeds=1))
+    before = trainer.networks.actor.theta.clone()
+    rollout, shuffles = trainer.collector.collect(100), [stream.shuffle for stream in trainer.streams]
+    with pytest.raises(ValueError, match=r"100 = 1 × 64 \+ 36; 50 would"):
+        algorithm.update(trainer.networks, trainer.optimizer, rollout, shuffles, trainer.config.algorithm)
+    assert torch.equal(before, trainer.networks.actor.theta)

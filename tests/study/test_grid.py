@@ -20,8 +20,9 @@ from inbounds.study.grid import (
     select,
     study_cells,
 )
-from inbounds.study.ledger import CLAIMS
+from inbounds.study.ledger import CLAIMS, claims_named
 from inbounds.study.statistics import settings
+from inbounds.study.store import StudyFolder
 
 PROTOCOL = Path(__file__).parents[2] / "results" / "PROTOCOL.md"
 FIRST_STUDY = (*study_cells(), *AFTERWARDS)
@@ -185,3 +186,15 @@ def test_unknown_names_are_refused() -> None:
 def test_selection_keeps_the_order() -> None:
     cells = select(["beyond", "standard-hopper-ppo-*"])
     assert [cell.arm for cell in cells] == ["standard"] * 3 + ["beyond"] * 18
+
+
+def test_one_pattern_needs_no_list() -> None:
+    assert select("beyond") == select(["beyond"])
+    assert claims_named("kl") == claims_named(["kl"])
+
+
+def test_a_folder_may_be_named_by_a_word(tmp_path: Path) -> None:
+    (cell,) = select("standard-hopper-ppo-beta")
+    folder = StudyFolder(str(tmp_path))  # type: ignore[arg-type]
+    assert folder == StudyFolder(tmp_path)
+    assert folder.state(cell) != "finished"

@@ -616,6 +616,7 @@ def test_ten_seeds_resolve_about_one_and_a_third_standard_deviations() -> None:
     effect = statistics.smallest_detectable_effect(10, rng(), trials=50_000)
     assert effect == pytest.approx(1.33, abs=0.03)
     assert statistics.power(effect, 10, rng(1)) == pytest.approx(0.8, abs=0.015)
+    assert statistics.smallest_detectable_effect(10, rng(), chance=0.01) == 0.0  # found as often without one
     of_six = statistics.smallest_detectable_effect(10, rng(), tests=6)
     assert of_six > 1.25 * effect
 

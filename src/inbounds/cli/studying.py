@@ -125,7 +125,7 @@ class Verify(_WhereAll):
     epochs: int = 2
     """To run again."""
     rerun: tuple[str, ...] = ()
-    """Which cells; by default one per algorithm and family."""
+    """Which cells; by default one per algorithm, family and engine."""
     random: int = 0
     """Choose so many finished cells at random instead."""
     random_seed: int = 0

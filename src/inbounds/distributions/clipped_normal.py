@@ -54,7 +54,7 @@ class ClippedNormal(NormalLatent):
         validate_args: check parameters and values; see `BoundedDistribution`.
 
     Raises:
-        ValueError: parameters or bounds that make no distribution; the message names the fix.
+        ValueError: parameters or bounds that make no distribution; of bounds the message names the fix.
 
     Example:
         >>> import torch

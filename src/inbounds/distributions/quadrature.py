@@ -86,7 +86,7 @@ def trapezoid(num_nodes: int = 101, half_width: float = 8.5, dtype: torch.dtype 
         A rule with `[N]` nodes and weights.
 
     Raises:
-        ValueError: fewer than two nodes, or a half-width that is not positive.
+        ValueError: fewer than two nodes, a half-width that is not positive, or a type that is not floating.
 
     Example:
         >>> rule = trapezoid(num_nodes=5, half_width=4.0)
@@ -169,7 +169,7 @@ def graded_trapezoid(
         A rule with `[..., N]` nodes and weights, constant to autograd.
 
     Raises:
-        ValueError: fewer than two nodes, or a half-width that is not positive.
+        ValueError: fewer than two nodes, a half-width that is not positive, or a type that is not floating.
 
     Example:
         >>> import torch
@@ -179,21 +179,20 @@ def graded_trapezoid(
         >>> round(float(mean), 6)  # half, and a little to the right
         0.500399
     """
-    double = torch.promote_types(loc.dtype, scale.dtype) == torch.float64
+    dtype = torch.promote_types(loc.dtype, scale.dtype)
+    double = dtype == torch.float64
     if num_nodes is None:
         num_nodes = 128 if double else 48
     if half_width is None:
         half_width = 10.0 if double else 7.0
     _check_trapezoid(num_nodes, half_width)
-    _check_floating(loc.dtype)
+    _check_floating(dtype)
     loc, scale = loc.detach().unsqueeze(-1), scale.detach().unsqueeze(-1)
     centre = (-loc / scale).clamp(-half_width, half_width)
     rate = scale / (2 * math.pi)
     start = torch.asinh(rate * (-half_width - centre))
     stop = torch.asinh(rate * (half_width - centre))
-    u = start + (stop - start) * torch.linspace(
-        0, 1, num_nodes, dtype=loc.dtype, device=loc.device
-    )  # [..., N]
+    u = start + (stop - start) * torch.linspace(0, 1, num_nodes, dtype=dtype, device=loc.device)  # [..., N]
     nodes = centre + torch.sinh(u) / rate
     step = (stop - start) / (num_nodes - 1)
     weights = step * torch.cosh(u) / rate * standard_normal_pdf(nodes)

@@ -146,6 +146,9 @@ def update(
     Returns:
         The diagnostics `[S]` of `diagnose`.
 
+    Raises:
+        ValueError: minibatches do not divide the rollout; nothing has changed then.
+
     Example:
         >>> from inbounds.learning import Trainer, preset
         >>> trainer = Trainer(preset("common", "Hopper-v5", algo="policy-gradient", seeds=2))
@@ -155,6 +158,7 @@ def update(
         >>> found["kl"].shape
         torch.Size([2])
     """
+    check_minibatches(rollout.horizon, config.minibatch_size)
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage
     optimizer.actor.minimize(loss(networks, rollout, weights, config.entropy_coef))

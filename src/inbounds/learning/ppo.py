@@ -158,6 +158,9 @@ def update(
         Diagnostics `[S]`: those of `diagnose`, and `clip_fraction`, the fraction of steps whose ratio ended
         beyond 1 ± ε.
 
+    Raises:
+        ValueError: minibatches do not divide the rollout; nothing has changed then.
+
     Example:
         >>> from inbounds.learning import PPOConfig, Trainer, preset
         >>> trainer = Trainer(preset("common", "Hopper-v5", seeds=2))
@@ -166,6 +169,7 @@ def update(
         >>> sorted(update(trainer.networks, trainer.optimizer, rollout, shuffles, PPOConfig(horizon=128)))
         ['approx_kl', 'clip_fraction', 'entropy', 'explained_variance', 'kl']
     """
+    check_minibatches(rollout.horizon, config.minibatch_size)
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     if isinstance(optimizer, SeedAdam):
         for _ in range(config.num_epochs):

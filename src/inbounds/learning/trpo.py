@@ -333,7 +333,11 @@ def update(
     Returns:
         Diagnostics `[S]`: those of `diagnose`, `accepted` (1 or 0) and `step_fraction` of the line search.
         (`inbounds.learning.policy_gradient.update`, which is called alike, has an example.)
+
+    Raises:
+        ValueError: minibatches do not divide the rollout; nothing has changed then.
     """
+    check_minibatches(rollout.horizon, config.minibatch_size)
     advantage, return_ = rollout.advantages(config.gamma, config.gae_lambda)
     weights = normalize_advantage(advantage) if config.normalize_advantage else advantage
     step = natural_step(networks, rollout, weights, config)

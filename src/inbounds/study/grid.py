@@ -215,6 +215,7 @@ def select(patterns: Sequence[str] = (), cells: Sequence[Cell] | None = None) ->
         >>> [cell.id for cell in select(["*-ant-*-raw-cost"])], len(select(["beyond"]))
         (['mechanisms-ant-ppo-gaussian-raw-cost'], 18)
     """
+    patterns = (patterns,) if isinstance(patterns, str) else patterns
     if cells is None:
         cells = all_cells() if patterns else study_cells()
     matches = {p: [c for c in cells if c.arm == p or fnmatch.fnmatchcase(c.id, p)] for p in patterns}

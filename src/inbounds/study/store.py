@@ -112,6 +112,10 @@ class StudyFolder:
     results: Path = Path("results")
     work: Path = Path("runs/study")
 
+    def __post_init__(self) -> None:
+        for name in ("results", "work"):
+            object.__setattr__(self, name, Path(getattr(self, name)))
+
     @classmethod
     def shipped(cls, root: Path = ROOT) -> StudyFolder:
         """Return the folders of the study that the project ships, wherever Python was started.

@@ -26,7 +26,7 @@ def executed_std(family: str, scale: float) -> float:
         scale: σ of the latent Normal; for `beta`, α = β.
 
     Returns:
-        The standard deviation, in units of half the action range; below 1, where all mass is on the bounds.
+        The standard deviation, in units of half the action range; at most 1, where all mass is on the bounds.
 
     Raises:
         ValueError: no family of that name, or a scale that is not positive and finite.
@@ -37,7 +37,7 @@ def executed_std(family: str, scale: float) -> float:
     """
     if not 0 < scale < math.inf:
         raise ValueError(f"a scale must be positive and finite, got {scale}")
-    return family_of(family).executed_std(scale)
+    return min(1.0, family_of(family).executed_std(scale))
 
 
 def head_bias(config: PolicyConfig) -> tuple[float, float] | None:

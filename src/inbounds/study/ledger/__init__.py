@@ -34,6 +34,7 @@ def claims_named(names: Sequence[str] = ()) -> tuple[Claim, ...]:
         >>> [claim.id for claim in claims_named(["kl", "clip"])]
         ['clip', 'kl']
     """
+    names = (names,) if isinstance(names, str) else names
     known = [claim.id for claim in CLAIMS]
     if unknown := [name for name in names if name not in known]:
         raise ValueError(f"no claim {', '.join(unknown)}; there are {', '.join(known)}")

@@ -100,7 +100,7 @@ def smallest_detectable_effect(
         draw: as in `power`.
 
     Returns:
-        The effect in standard deviations.
+        The effect in standard deviations; 0 where the test finds as much without one.
 
     Raises:
         ValueError: a chance outside (0, 1), or a setting that makes no sense.
@@ -112,4 +112,4 @@ def smallest_detectable_effect(
     """
     if not 0 < chance < 1:
         raise ValueError(f"chance must be in (0, 1), got {chance}")
-    return float(np.quantile(_needed_effects(n, rng, level, tests, trials, draw), chance))
+    return max(0.0, float(np.quantile(_needed_effects(n, rng, level, tests, trials, draw), chance)))
