@@ -38,8 +38,8 @@ class ClippedNormal(NormalLatent):
     r"""Law of min(max(z, low), high) for z ~ Normal(loc, scale); elementwise over broadcast parameters.
 
     **Edges of the support.** The support is the closed interval: a bound is a value like any other, and the most
-    frequent one. Beyond it `log_prob` raises under validation and is −inf without. A value within an ulp of a bound
-    is *inside*: compare with `low` in the law's own type, as `rsample` does.
+    frequent one. Beyond it `log_prob` and `cdf` raise under validation; without, they are −inf, and
+    0 or 1. A value within an ulp of a bound is *inside*: compare with `low` in the law's own type, as `rsample` does.
 
     **The latent** is the unclipped z. Clipping forgets it, so there is no `value_to_latent`.
 

@@ -26,10 +26,11 @@ def gae(
 
     Args:
         reward: `[S, T]`.
-        value: `[S, T]` V(s_t).
+        value: `[S, T]` V(s_t), without a graph (`detach`).
         terminated: `[S, T]` booleans, the episode ended by itself after step t.
         truncated: `[S, T]` booleans, the episode was cut off after step t.
-        bootstrap: `[S, T]` V of the observation after step t: read where truncated, and at the last step.
+        bootstrap: `[S, T]` V of the observation after step t: read where truncated, and at the last step unless it
+            terminated.
         gamma: discount γ per step.
         gae_lambda: λ; 1 is the discounted return minus the value, 0 the one-step residual.
 

@@ -52,7 +52,8 @@ class Rollout:
     truncated: Tensor
     """`[S, T]` booleans: the episode was cut off after this step."""
     bootstrap: Tensor
-    """`[S, T]` value of the observation after the step where it was truncated and at the last step, else 0."""
+    """`[S, T]` value of the observation after the step where it was truncated and at the last step, else 0.
+    Not read where the step terminated: at the last step it is then that of the next episode's start."""
     value: Tensor
     """`[S, T]` value of `obs`."""
     log_prob: Tensor
