@@ -52,8 +52,7 @@ class Rollout:
     truncated: Tensor
     """`[S, T]` booleans: the episode was cut off after this step."""
     bootstrap: Tensor
-    """`[S, T]` value of the observation after the step where it was truncated and at the last step, else 0.
-    Not read where the step terminated: at the last step it is then that of the next episode's start."""
+    """`[S, T]` V of the observation after a truncated and after the last step, else 0; not read where it terminated."""
     value: Tensor
     """`[S, T]` value of `obs`."""
     log_prob: Tensor
