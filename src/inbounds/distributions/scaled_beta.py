@@ -263,6 +263,17 @@ def log_beta(alpha: Tensor, beta: Tensor) -> Tensor:
     return torch.lgamma(alpha) + torch.lgamma(beta) - torch.lgamma(alpha + beta)
 
 
+def before_softplus(concentration: float) -> float:
+    """Return the u of a concentration 1 + softplus(u), without overflow; one that rounds to 1 has the least u.
+
+    Example:
+        >>> round(before_softplus(1 + math.log(2)), 12)
+        0.0
+    """
+    excess = max(concentration - 1, math.ulp(1.0))
+    return excess + math.log(-math.expm1(-excess))
+
+
 def _rsample_log_gamma(concentration: Tensor, generator: torch.Generator | None) -> Tensor:
     """Return the logarithm of Gamma(concentration, 1) samples."""
     uniform = torch.rand(

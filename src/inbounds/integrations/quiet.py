@@ -75,16 +75,6 @@ def quiet_concentration(std: float = 0.4) -> float:
     return (std**-2 - 1) / 2
 
 
-def inverse_softplus(value: float) -> float:
-    """Return the x of log(1 + eˣ) = value, for a positive value, without overflow.
-
-    Example:
-        >>> round(inverse_softplus(math.log(2)), 12)
-        0.0
-    """
-    return value + math.log(-math.expm1(-value))
-
-
 def one_number(std: float) -> float:
     """Return a standard deviation as Python's number.
 

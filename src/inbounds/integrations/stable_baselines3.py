@@ -45,6 +45,10 @@ class ScoresLatents:
     distribution: Any
     """`LogitNormal` or `ScaledBeta`, batch shape `[B, A]`."""
 
+    def __init__(self, low: NDArray[Any], high: NDArray[Any]) -> None:
+        super().__init__(len(low))  # type: ignore[call-arg]  # of the peer's law, the next base
+        self.low, self.high = require_bounds(low, high)
+
     def log_prob(self, actions: Tensor) -> Tensor:
         """Return the log-density `[B]` of the *actions* that latents `[B, A]` stand for, in nats."""
         return self.distribution.log_prob_latent(actions).sum(-1)
@@ -86,10 +90,6 @@ class LogitNormalDistribution(ScoresLatents, DiagGaussianDistribution):
     """
 
     distribution: LogitNormal  # type: ignore[assignment]  # the peer's is a Normal
-
-    def __init__(self, low: NDArray[Any], high: NDArray[Any]) -> None:
-        super().__init__(len(low))
-        self.low, self.high = require_bounds(low, high)
 
     def proba_distribution(self, mean_actions: Tensor, log_std: Tensor) -> LogitNormalDistribution:
         """Set μ `[B, A]` and log σ `[A]` of the latent, as the peer's heads give them.

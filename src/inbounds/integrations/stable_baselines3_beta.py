@@ -9,17 +9,15 @@ the latent, the logit of the fraction of the way through the box; `stable_baseli
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from inbounds.distributions import ScaledBeta
-from inbounds.distributions.bounds import require_bounds
-from inbounds.integrations.quiet import inverse_softplus, quiet_concentration
+from inbounds.distributions.scaled_beta import before_softplus
+from inbounds.integrations.quiet import quiet_concentration
 from inbounds.integrations.stable_baselines3 import BoundedPolicy, ScoresLatents, require_finite
 
 try:
@@ -55,10 +53,6 @@ class BetaDistribution(ScoresLatents, BernoulliDistribution):
 
     distribution: ScaledBeta  # type: ignore[assignment]  # the peer's is a Bernoulli
 
-    def __init__(self, low: NDArray[Any], high: NDArray[Any]) -> None:
-        super().__init__(len(low))
-        self.low, self.high = require_bounds(low, high)
-
     def proba_distribution_net(self, latent_dim: int) -> nn.Module:
         """Return the layer from features `[B, F]` to outputs `[B, 2A]`: of α, then of β."""
         return nn.Linear(latent_dim, 2 * self.action_dims)
@@ -82,8 +76,7 @@ class BetaDistribution(ScoresLatents, BernoulliDistribution):
     @staticmethod
     def start_quietly(policy: Any, std: float) -> None:
         """Set the head's bias; see `quiet_start`."""
-        excess = max(quiet_concentration(std) - 1, math.ulp(1.0))
-        policy.action_net.bias.fill_(inverse_softplus(excess))
+        policy.action_net.bias.fill_(before_softplus(quiet_concentration(std)))
 
 
 class BetaPolicy(BoundedPolicy):

@@ -24,7 +24,6 @@ on again. What the network of an actor gives is checked here all the same, but n
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -35,7 +34,8 @@ from torch.distributions import Distribution, constraints, kl_divergence, regist
 
 from inbounds.distributions import LogitNormal, ScaledBeta
 from inbounds.distributions.bounds import TensorLike, require_bounds
-from inbounds.integrations.quiet import inverse_softplus, one_number, quiet_concentration, quiet_scale
+from inbounds.distributions.scaled_beta import before_softplus
+from inbounds.integrations.quiet import quiet_concentration, quiet_scale
 
 try:
     from tensordict.nn import TensorDictModule, TensorDictSequential
@@ -237,8 +237,7 @@ class _BetaHead(nn.Module):
 
     def __init__(self, start: float) -> None:
         super().__init__()
-        excess = max(start - 1, math.ulp(1.0))
-        self.shift = inverse_softplus(excess)
+        self.shift = before_softplus(start)
 
     def forward(self, outputs: Tensor) -> tuple[Tensor, ...]:
         return tuple((1 + nn.functional.softplus(outputs + self.shift)).chunk(2, dim=-1))
@@ -298,7 +297,6 @@ def quiet_actor(
     """
     if law not in PARAMETERS:
         raise ValueError(f"quiet_actor knows the laws LogitNormal and ScaledBeta, not {law}")
-    std = one_number(std)
     if law is ScaledBeta:
         head: nn.Module = _BetaHead(quiet_concentration(std))
     else:

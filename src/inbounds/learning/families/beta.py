@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.distributions import kl_divergence
 
 from inbounds.distributions import ScaledBeta
-from inbounds.distributions.scaled_beta import log_beta
+from inbounds.distributions.scaled_beta import before_softplus, log_beta
 from inbounds.learning.families.family import (
     Array,
     Family,
@@ -127,8 +127,7 @@ def beta_entropy(parameters: BetaParameters) -> Tensor:
 
 def beta_head_bias(std: float, limits: Limits) -> tuple[float, float]:
     """Return the pre-activations of α = β with sd² = 1/(2α + 1)."""
-    excess = max((1 / std**2 - 1) / 2 - 1, math.ulp(1.0))  # α − 1, which rounds to 0 beside the widest law
-    pre_activation = excess + math.log(-math.expm1(-excess))  # softplus⁻¹
+    pre_activation = before_softplus((1 / std**2 - 1) / 2)
     return pre_activation, pre_activation
 
 

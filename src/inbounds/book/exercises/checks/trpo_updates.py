@@ -49,12 +49,18 @@ def _same(a: Tensor, b: Tensor) -> bool:
     return torch.allclose(a, b, rtol=1e-6, atol=1e-8)
 
 
+def _steps_as_the_package(scene: Small, config: TRPOConfig) -> bool:
+    """Whether the policy is where the package's step takes it."""
+    actor = slice(0, scene.actor_size)
+    return _same(scene.weights()[actor], scene.after_the_packages(config)[actor])
+
+
 def _of_a_policy(small: Small, before: Tensor) -> str:
     """What is wrong with the policy's step."""
-    actor, after = slice(0, small.actor_size), small.weights()
-    if _same(after[actor], small.after_the_packages(TRPO)[actor]):
+    if _steps_as_the_package(small, TRPO):
         return ""
-    if torch.equal(after[actor], before[actor]):
+    actor = slice(0, small.actor_size)
+    if torch.equal(small.weights()[actor], before[actor]):
         return "the policy has not moved: natural_step, then line_search"
     hints = (
         "are the advantages the *first* of the two that `advantages` returns, and normalised over the whole batch? "
@@ -65,8 +71,7 @@ def _of_a_policy(small: Small, before: Tensor) -> str:
 
 def _of_a_search(far: Small) -> str:
     """What is wrong where the full step is too long."""
-    actor = slice(0, far.actor_size)
-    if _same(far.weights()[actor], far.after_the_packages(FAR)[actor]):
+    if _steps_as_the_package(far, FAR):
         return ""
     start = Small(log_scale=NARROW)
     with torch.no_grad():
@@ -79,8 +84,7 @@ def _of_a_search(far: Small) -> str:
 
 def _of_a_direction(edge: Small) -> str:
     """What is wrong where only KL(old‖new) allows the full step."""
-    actor = slice(0, edge.actor_size)
-    if _same(edge.weights()[actor], edge.after_the_packages(EDGE)[actor]):
+    if _steps_as_the_package(edge, EDGE):
         return ""
     return (
         f"with max_kl = {EDGE.max_kl} its step is another one: mean_kl() is KL(old‖new), "
