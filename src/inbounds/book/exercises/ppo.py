@@ -247,13 +247,18 @@ def update(function: Callable[..., Any]) -> Judgement:
         >>> update(lambda *arguments, **options: None)
         … not answered: <lambda>: the weights have not moved: write it, and run this cell again
     """
-    name, small = getattr(function, "__name__", "your function"), Small()
+    name = getattr(function, "__name__", "your function")
+    small, quiet = (
+        Small(),
+        Small(unit=0.01),
+    )  # the second's gradients are not all cut: the loss's own scale has a say
     before, adam, taken = small.weights(), small.adam(PPO), []
     adam.register_step_post_hook(lambda *_: taken.append(1))
-    torch.manual_seed(SEED)
     coefficients = {key: getattr(PPO, key) for key in ("clip_range", "entropy_coef", "value_coef")}
     try:
-        function(small.policy, small.critic, adam, small.batch, passes=3, size=16, **coefficients)
+        for scene, each in ((small, adam), (quiet, quiet.adam(PPO))):
+            torch.manual_seed(SEED)
+            function(scene.policy, scene.critic, each, scene.batch, passes=3, size=16, **coefficients)
     except Exception as error:
         return Judgement(name, False, explained(error))
     after = small.weights()
@@ -265,9 +270,6 @@ def update(function: Callable[..., Any]) -> Judgement:
     if torch.equal(before, after):
         return Judgement(name, None, "the weights have not moved: write it, and run this cell again")
     if _same(after, small.after_the_packages(PPO)):
-        quiet = Small(unit=0.01)  # some of its gradients are not cut: the loss's own scale has a say
-        torch.manual_seed(SEED)
-        function(quiet.policy, quiet.critic, quiet.adam(PPO), quiet.batch, passes=3, size=16, **coefficients)
         if not _same(quiet.weights(), quiet.after_the_packages(PPO)):
             factor = "right where every gradient is cut to 0.5, wrong where some are shorter: no factor before the loss"
             return Judgement(name, False, factor)
